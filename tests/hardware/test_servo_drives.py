@@ -237,7 +237,7 @@ def test_wrong_configuration_is_named_before_anything_moves(
     message: str,
 ) -> None:
     rotation = AXES["rotation"] | {"model": MODELS[protocol]} | changes
-    config = servos_config(protocol, tmp_path, rotation=rotation, request_timeout=0.1)
+    config = servos_config(protocol, tmp_path, rotation=rotation, request_timeout=0.2)
     with SimulatedServos(servos_config(protocol, tmp_path), start=START) as servos:
         if not changes:  # another model is connected
             servos.servos[1].set(servos.servos[1].family.model, 2825)

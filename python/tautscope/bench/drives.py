@@ -14,11 +14,9 @@ import heapq
 import itertools
 import json
 import sys
-import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Literal, Self, get_args
+from typing import Literal, get_args
 
 import can
 import numpy as np
@@ -27,7 +25,8 @@ from numpy.typing import NDArray
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
-from tautscope.bench.events import Event, EventPrinter
+from tautscope.bench.events import EventPrinter
+from tautscope.bench.motors import SimulatedMotors
 from tautscope.config import DrivesConfig, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -43,10 +42,8 @@ OnSync = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 the TxPDOs are sent."""
 
 
-class SimulatedDrives:
-    """Three drives on one bus, in a thread; a context manager.
-
-    Leaving it powers the drives off and raises the error that ended the thread, if any.
+class SimulatedDrives(SimulatedMotors[FaultKind]):
+    """Three drives on one bus.
 
     Args:
         bus: The bus; it stays open.
@@ -67,13 +64,11 @@ class SimulatedDrives:
         modes: tuple[int, ...] = (7, 8),
         absent: tuple[int, ...] = (),
     ) -> None:
+        super().__init__(get_args(FaultKind))
         self._bus = bus
         self._on_sync = on_sync
-        self._events: list[Event] = []
-        self._requests: deque[tuple[FaultKind | None, Dof, float]] = deque()
         self._delayed: list[tuple[float, int, can.Message]] = []
         self._order = itertools.count()
-        self._faults: dict[Dof, dict[FaultKind, float]] = {dof: {} for dof in Dof}
         self._drives = [
             SimulatedDrive(
                 dof,
@@ -89,56 +84,15 @@ class SimulatedDrives:
         for drive, position in zip(self._drives, where, strict=True):
             drive.values[0x6064, 0] = drive.scale.to_counts(float(position))
         self._is_disconnected = False
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="simulated drives", daemon=True)
-        self._failure: BaseException | None = None
-
-    def inject(self, kind: FaultKind, dof: Dof, delay: float = 0.3) -> None:
-        """Inject a fault; `delay` [s] applies to the kind ``delay``.
-
-        Raises:
-            ConfigError: There is no such fault.
-        """
-        if kind not in get_args(FaultKind):
-            raise ConfigError("fault", kind, "one of " + ", ".join(get_args(FaultKind)))
-        self._requests.append((kind, dof, delay))
-
-    def clear(self, dof: Dof) -> None:
-        """End the faults of a drive; the fault state remains until it is reset."""
-        self._requests.append((None, dof, 0.0))
-
-    @property
-    def events(self) -> list[Event]:
-        """All events, in order."""
-        return list(self._events)
-
-    def log_event(self, source: str, what: str) -> None:
-        """Add an event of another part of the bench."""
-        self._events.append(Event(time.monotonic(), source, what))
 
     @property
     def states(self) -> Mapping[Dof, State]:
         """The state of each drive."""
         return {dof: self._drives[dof].status for dof in Dof}
 
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self._stopping.set()
-        self._thread.join()
-        if self._failure is not None:
-            raise self._failure
-
-    def _run(self) -> None:
-        try:
-            for drive in self._drives:
-                drive.boot(time.monotonic())
-            while not self._stopping.is_set():
-                self._process_next()
-        except BaseException as error:
-            self._failure = error
+    def _begin(self) -> None:
+        for drive in self._drives:
+            drive.boot(time.monotonic())
 
     def _process_next(self) -> None:
         due = min(drive.deadline() for drive in self._drives)
@@ -146,8 +100,7 @@ class SimulatedDrives:
             due = min(due, self._delayed[0][0])
         message = self._receive(min(max(due - time.monotonic(), 0.0), 0.05))
         now = time.monotonic()
-        while self._requests:
-            self._apply_request(*self._requests.popleft(), now)
+        self._apply_requests(now)
         if message is not None and not message.is_error_frame:
             identifier, data = message.arbitration_id, bytes(message.data)
             for dof, drive in zip(Dof, self._drives, strict=True):
@@ -186,19 +139,16 @@ class SimulatedDrives:
             if "freeze" not in self._faults[dof]:
                 drive.set_position(drive.scale.to_counts(float(actual[dof])))
 
-    def _apply_request(self, kind: FaultKind | None, dof: Dof, delay: float, now: float) -> None:
+    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
         drive = self._drives[dof]
-        if kind is None:
-            self._faults[dof].clear()
-            drive.refuses_mode = False
-        else:
-            self._faults[dof][kind] = delay
-            self._logger(dof)(now, f"fault: {kind}")
-            if kind == "fault":
-                drive.fail(now)
-            drive.refuses_mode |= kind == "refuse"
-            if kind == "refuse":
-                drive.values[0x6061, 0] = 0
+        if kind == "fault":
+            drive.fail(now)
+        elif kind == "refuse":
+            drive.refuses_mode = True
+            drive.values[0x6061, 0] = 0
+
+    def _recover(self, dof: Dof) -> None:
+        self._drives[dof].refuses_mode = False
 
     def _sender(self, dof: Dof) -> Send:
         def send(identifier: int, data: bytes) -> None:
@@ -213,12 +163,6 @@ class SimulatedDrives:
                 self._transmit(message)
 
         return send
-
-    def _logger(self, dof: Dof) -> Callable[[float, str], None]:
-        def log(now: float, what: str) -> None:
-            self._events.append(Event(now, dof.label, what))
-
-        return log
 
 
 def main() -> None:

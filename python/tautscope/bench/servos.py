@@ -13,19 +13,17 @@ import heapq
 import itertools
 import os
 import select
-import threading
 import time
 import tty
-from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Literal, Self, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench import servo_packets as packets
-from tautscope.bench.events import Event
+from tautscope.bench.motors import SimulatedMotors
 from tautscope.bench.servo import (
     CHECKSUM,
     DATA_LENGTH,
@@ -48,8 +46,8 @@ _IDLE = 0.005
 """How often the line is looked at while no client has it open [s]."""
 
 
-class SimulatedServos:
-    """Three servos on one line, in a thread; a context manager.
+class SimulatedServos(SimulatedMotors[FaultKind]):
+    """Three servos on one line.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
@@ -67,14 +65,12 @@ class SimulatedServos:
         *,
         start: NDArray[np.float64] | None = None,
     ) -> None:
+        super().__init__(get_args(FaultKind))
         self._config = config
         self._on_cycle = on_cycle
         self._is_v2 = config.protocol == "dynamixel"
         self._codec = DynamixelPackets() if self._is_v2 else FeetechPackets()
         self._word = 2 if self._is_v2 else 1
-        self._events: list[Event] = []
-        self._requests: deque[tuple[FaultKind | None, Dof, float]] = deque()
-        self._faults: dict[Dof, dict[FaultKind, float]] = {dof: {} for dof in Dof}
         self._answers: list[tuple[float, int, bytes]] = []
         self._order = itertools.count()
         self.servos = [
@@ -92,45 +88,14 @@ class SimulatedServos:
         self._link = Path(config.channel)
         self._line = self._open()
         self._buffer = bytearray()
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="simulated servos", daemon=True)
-        self._failure: BaseException | None = None
-
-    def inject(self, kind: FaultKind, dof: Dof, delay: float = 0.3) -> None:
-        """Inject a fault; `delay` [s] applies to the kind ``delay``.
-
-        Raises:
-            ConfigError: There is no such fault.
-        """
-        if kind not in get_args(FaultKind):
-            raise ConfigError("fault", kind, "one of " + ", ".join(get_args(FaultKind)))
-        self._requests.append((kind, dof, delay))
-
-    def clear(self, dof: Dof) -> None:
-        """End the faults of a servo; a fault that it reports remains until it is reset."""
-        self._requests.append((None, dof, 0.0))
-
-    @property
-    def events(self) -> list[Event]:
-        """All events, in order."""
-        return list(self._events)
-
-    def log_event(self, source: str, what: str) -> None:
-        """Add an event of another part of the bench."""
-        self._events.append(Event(time.monotonic(), source, what))
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
 
     def __exit__(self, *failure: object) -> None:
-        self._stopping.set()
-        self._thread.join()
-        self._link.unlink(missing_ok=True)
-        os.close(self._line)
-        os.close(self._lock)
-        if self._failure is not None:
-            raise self._failure
+        try:
+            super().__exit__(*failure)
+        finally:
+            self._link.unlink(missing_ok=True)
+            os.close(self._line)
+            os.close(self._lock)
 
     def _open(self) -> int:
         line, end = os.openpty()
@@ -151,13 +116,8 @@ class SimulatedServos:
         os.set_blocking(line, False)
         return line
 
-    def _run(self) -> None:
-        try:
-            self._stepped_at = time.monotonic()
-            while not self._stopping.is_set():
-                self._process_next()
-        except BaseException as error:
-            self._failure = error
+    def _begin(self) -> None:
+        self._stepped_at = time.monotonic()
 
     def _process_next(self) -> None:
         due = self._stepped_at + 1.5 * self._config.cycle
@@ -165,8 +125,7 @@ class SimulatedServos:
             due = min(due, self._answers[0][0])
         self._receive(max(0.0, due - time.monotonic()))
         now = time.monotonic()
-        while self._requests:
-            self._apply_request(*self._requests.popleft(), now)
+        self._apply_requests(now)
         for packet in self._codec.split(self._buffer):
             for servo in self._listening():
                 servo.hear(now)
@@ -274,25 +233,16 @@ class SimulatedServos:
                 servo.write(address, data[start + 1 : start + 1 + size], now)
         self._has_goals |= address == servo.family.goal.address
 
-    def _apply_request(self, kind: FaultKind | None, dof: Dof, delay: float, now: float) -> None:
+    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
         servo = self.servos[dof]
-        if kind is None:
-            self._faults[dof].clear()
-            servo.is_blocked = False
-            return
-        self._faults[dof][kind] = delay
-        self._logger(dof)(now, f"fault: {kind}")
         servo.is_blocked |= kind == "freeze"
         if kind == "fault":
             servo.fail(OVERLOAD, now)
         elif kind == "restart":
             servo.restart(now)
 
-    def _logger(self, dof: Dof) -> Callable[[float, str], None]:
-        def log(now: float, what: str) -> None:
-            self._events.append(Event(now, dof.label, what))
-
-        return log
+    def _recover(self, dof: Dof) -> None:
+        self.servos[dof].is_blocked = False
 
 
 def _number(data: bytes) -> int:

@@ -23,7 +23,8 @@ SECONDS, RATE = 10.0, 10.0
 """Length of the film [s], and its images per second."""
 WIDTH = 360
 """Width of each side [px]."""
-GHOST = (255, 255, 255)
+WHITE, SHADE = (255, 255, 255), (40, 20, 20)
+FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def write_film(place: Path, without: Recording, compensated: Recording) -> None:
@@ -40,11 +41,11 @@ def write_film(place: Path, without: Recording, compensated: Recording) -> None:
         for run, title in ((without, "without"), (compensated, "with tautscope"))
     ]
     joined = [np.hstack(pair)[:, :, ::-1] for pair in zip(*sides, strict=True)]
-    # An octree keeps the few pixels of the bands in their colour.
-    octree = Pillow.Quantize.FASTOCTREE
+    # One palette, so that what rests does not flicker; an octree keeps the few pixels of the bands.
+    octree, plain = Pillow.Quantize.FASTOCTREE, Pillow.Dither.NONE
+    palette = Pillow.fromarray(np.vstack(joined[::10])).quantize(method=octree)
     first, *others = (
-        Pillow.fromarray(image).quantize(method=octree, dither=Pillow.Dither.NONE)
-        for image in joined
+        Pillow.fromarray(image).quantize(palette=palette, dither=plain) for image in joined
     )
     first.save(place, save_all=True, append_images=others, duration=1e3 / RATE, loop=0)
 
@@ -79,9 +80,11 @@ def _frame(image: Image, wanted: tuple[NDArray[np.float64], object] | None, titl
     if wanted is not None:
         a, b = ((round(u), round(v)) for u, v in wanted[0].reshape(2, 2).tolist())
         for centre in (a, b):
-            cv2.circle(frame, centre, 16, GHOST, 2, cv2.LINE_AA)
-        cv2.line(frame, a, b, GHOST, 1, cv2.LINE_AA)
-    cv2.putText(frame, title, (20, 50), cv2.FONT_HERSHEY_SIMPLEX, 1.4, GHOST, 2, cv2.LINE_AA)
+            cv2.circle(frame, centre, 16, WHITE, 2, cv2.LINE_AA)
+        cv2.line(frame, a, b, WHITE, 1, cv2.LINE_AA)
+    (width, height), _ = cv2.getTextSize(title, FONT, 1.4, 2)
+    cv2.rectangle(frame, (0, 0), (width + 40, height + 40), SHADE, cv2.FILLED)
+    cv2.putText(frame, title, (20, height + 20), FONT, 1.4, WHITE, 2, cv2.LINE_AA)
     height = round(WIDTH * frame.shape[0] / frame.shape[1])
     small = cv2.resize(frame, (WIDTH, height), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)

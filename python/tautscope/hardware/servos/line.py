@@ -66,17 +66,17 @@ class ServoLine:
         """Set the timeout of each answer [s]."""
         self._port.set_timeout(timeout)
 
-    def read(self, servo: int, address: int, size: int) -> tuple[bytes, int]:
-        """Bytes from one servo, and the error of its answer.
+    def read(self, servo: int, register: Register) -> tuple[int, int]:
+        """Read from one servo: value, and the error of its answer.
 
         Raises:
             NoAnswerError: It did not answer.
             BusError: The port is lost.
         """
         data, error = self._transfer(
-            lambda: self._port.read_raw_data_with_error(servo, address, size)
+            lambda: self._port.read_raw_data_with_error(servo, register.address, register.size)
         )
-        return bytes(data), error
+        return register.decode(bytes(data)), error
 
     def write(self, servo: int, register: Register, value: int) -> int:
         """Write to one servo; the error of its answer.
@@ -105,17 +105,19 @@ class ServoLine:
             )
         return error
 
-    def read_all(self, servos: Sequence[int], address: int, size: int) -> list[tuple[bytes, int]]:
-        """The same bytes of several servos with one packet (sync read), and the errors.
+    def read_all(self, servos: Sequence[int], register: Register) -> list[tuple[int, int]]:
+        """Read from several servos with one packet (sync read): values, and the errors.
 
         Raises:
             NoAnswerError: One of them did not answer.
             BusError: The port is lost.
         """
         answers = self._transfer(
-            lambda: self._port.sync_read_raw_data_with_error(list(servos), address, size)
+            lambda: self._port.sync_read_raw_data_with_error(
+                list(servos), register.address, register.size
+            )
         )
-        return [(bytes(data), error) for data, error in answers]
+        return [(register.decode(bytes(data)), error) for data, error in answers]
 
     def write_all(self, values: Mapping[int, int], register: Register) -> None:
         """Write to several servos with one packet (sync write), which none answers.

@@ -48,8 +48,8 @@ class Servo:
 
     def read(self, register: Register) -> int:
         """Read a register."""
-        data, _ = self._ask(lambda: self._line.read(self.id, register.address, register.size))
-        return register.decode(data)
+        value, _ = self._ask(lambda: self._line.read(self.id, register))
+        return value
 
     def write(self, register: Register, value: int) -> None:
         """Write a register; it is not read back.

@@ -1,9 +1,9 @@
 """Three servos on a serial line: a `tautscope.hardware.drive_group.DriveGroup`.
 
-Each cycle is one sync write of the set-points and one sync read of position, voltage and
-temperature. A servo in position mode holds its last set-point. Of the two families only Dynamixel
-stops by itself when packets are missing (bus watchdog, `heartbeat_timeout`); docs/hardware.md
-says what moves after the end of the host.
+Each cycle is one sync write of the set-points and one sync read of the positions; each answer says
+whether its servo has a fault. A servo in position mode holds its last set-point. Of the two
+families only Dynamixel stops by itself when packets are missing (bus watchdog,
+`heartbeat_timeout`); docs/hardware.md says what moves after the end of the host.
 """
 
 from __future__ import annotations
@@ -58,8 +58,6 @@ class ServoDrives:
         self._goals = [0, 0, 0]
         self._sent_at = 0.0
         self._has_lost_answers = self._is_moving = self._was_enabled = False
-        self._block = family.position.address
-        self._block_size = family.temperature.address + family.temperature.size - self._block
 
     def name(self, dof: Dof) -> str:
         """See `DriveGroup.name`."""
@@ -177,10 +175,10 @@ class ServoDrives:
                 self._line.write_all(dict(zip(self._ids, values, strict=True)), register)
                 for dof in sorted(pending):
                     try:
-                        data, _ = self._line.read(self._ids[dof], register.address, register.size)
+                        value, _ = self._line.read(self._ids[dof], register)
                     except NoAnswerError:
                         continue
-                    if register.decode(data) == values[dof]:
+                    if value == values[dof]:
                         pending.discard(dof)
         except DriveError:
             pass  # the port is lost
@@ -189,12 +187,12 @@ class ServoDrives:
     def _receive(self) -> None:
         """Read all servos with one packet; one by one in the cycle after one did not answer."""
         was_lossy, self._has_lost_answers = self._has_lost_answers, False
-        answers: list[tuple[bytes, int] | None] = []
+        answers: list[tuple[int, int] | None] = []
         try:
             if was_lossy:
                 answers = [self._try_read(servo) for servo in self._ids]
             else:
-                answers += self._line.read_all(self._ids, self._block, self._block_size)
+                answers += self._line.read_all(self._ids, self._family.position)
         except NoAnswerError:
             answers = [None] * len(Dof)
         now = time.monotonic()
@@ -206,14 +204,14 @@ class ServoDrives:
                 continue
             one.age, one.silence, one.answered_at = 0, 0.0, now
             one.answers += 1
-            one.position = self._family.position.decode(answer[0][: self._family.position.size])
+            one.position = answer[0]
         for dof, answer in zip(Dof, answers, strict=True):
             if answer is not None and self._is_moving:
                 self._check_faults(dof, answer[1])
 
-    def _try_read(self, servo: int) -> tuple[bytes, int] | None:
+    def _try_read(self, servo: int) -> tuple[int, int] | None:
         try:
-            return self._line.read(servo, self._block, self._block_size)
+            return self._line.read(servo, self._family.position)
         except NoAnswerError:
             return None
 
