@@ -6,9 +6,9 @@ import argparse
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
-from tautscope.commands.calibration_rig import refuse_wrong_limits
+from tautscope.commands.calibration_rig import add_yes, refuse_wrong_limits
 from tautscope.commands.printing import print_json
-from tautscope.commands.question import ask
+from tautscope.commands.question import confirm
 from tautscope.config.edit import writable_file, write_values
 from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
@@ -36,7 +36,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="SHARE",
         help="torque_limit during the search, 0 to 1 [%(default)s]",
     )
-    stops.add_argument("--yes", action="store_true", help="start without asking")
+    add_yes(stops)
     stops.add_argument(
         "--write", action="store_true", help="write the values into the file of --config"
     )
@@ -56,9 +56,7 @@ def _run(options: argparse.Namespace) -> None:
     refuse_wrong_limits(options.config)
     if options.write:
         writable_file(options.config)
-    question = f"{dof.label} will move to both of its stops. Type y to start: "
-    if not options.yes and ask(question, config.camera).strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
+    confirm(f"{dof.label} will move to both of its stops.", options, config.camera)
     stops = find_stops(config, dof, options.torque)
     changes = stops.changes(config.drives, dof)
     if options.write:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import RecordError
-from tautscope.runs.tables import Sheet
+from tautscope.runs.tables import Sheet, filled
 from tautscope.runs.units import TIMES, split_unit
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
         columns.append(found)
         is_counter = np.all(np.diff(seen) > 0)
         if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
-            moving[name] = _filled(values)
+            moving[name] = filled(values)
     pairs = [
         (strength, *_ordered(one, other, moving))
         for one, other in combinations(moving, 2)
@@ -82,11 +82,6 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
     ]
     pairs.sort(key=lambda pair: -pair[0])
     return columns, [(command, tip) for _, command, tip in pairs[:MOST_PAIRS]]
-
-
-def _filled(values: Floats) -> Floats:
-    at, known = np.arange(len(values)), np.isfinite(values)
-    return np.interp(at, at[known], values[known])
 
 
 def _rank(name: str) -> int:

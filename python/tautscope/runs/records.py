@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
-from tautscope.runs.tables import read_table
+from tautscope.runs.tables import filled, read_table
 from tautscope.runs.units import TIMES, time_scale, units_of
 
 Floats = NDArray[np.float64]
@@ -277,16 +277,10 @@ def _sort_all(time: Floats, command: Floats) -> tuple[NDArray[np.intp], Floats, 
     if len(known) == len(command):
         return order, times, reordered, clock_steps
     if clock_steps:
-        return _sort(time, _filled(command))
+        return _sort(time, filled(command))
     lines = np.concatenate([known[order], np.flatnonzero(np.isnan(command))])
     lines = lines[np.argsort(time[lines], kind="stable")]
     return lines, time[lines], reordered, clock_steps
-
-
-def _filled(values: Floats) -> Floats:
-    """Missing values replaced by those between which they are, in the order of the file."""
-    at, known = np.arange(len(values)), np.isfinite(values)
-    return np.interp(at, at[known], values[known])
 
 
 def _interpolated(time: Floats, command: Floats) -> Floats:

@@ -164,6 +164,12 @@ def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
     return Sheet(file, frame, titles, text.groups, text.units, rows, "line")
 
 
+def filled(values: Floats) -> Floats:
+    """Missing values interpolated between the nearest known ones before and after."""
+    at, known = np.arange(len(values)), np.isfinite(values)
+    return np.interp(at, at[known], values[known])
+
+
 def _bytes(path: str | PathLike[str], what: str) -> bytes:
     if str(path) == STDIN:
         return sys.stdin.buffer.read()
