@@ -101,7 +101,10 @@ def test_doctor_jog_and_a_fault_by_name(
         assert moved["moved"] == pytest.approx(0.1, abs=0.01)
         assert moved["ended_at"] == pytest.approx(0.0, abs=0.01)
         out = str(tmp_path / "run")
-        with process("-c", RUN, "run", "--config", str(file), "--out", out) as (running, _):
+        with process("-c", RUN, "run", "--config", str(file), "--out", out, "--yes") as (
+            running,
+            _,
+        ):
             lines.until("torque on", 3)
             bench.stdin.write("fault rotation\n")
             bench.stdin.flush()

@@ -209,8 +209,9 @@ def test_a_gamepad_moves_another_robot(tmp_path: Path) -> None:
 
         def send() -> None:
             both.send_position(np.zeros(3))
-            axes = np.array([0.5, 0, 0, 0, 0], np.float32)
-            buttons = np.array([0, 0, 0, 0, pressed.pop(0)], np.int32)
+            held = pressed.pop(0)
+            axes = np.array([0.5 * held, 0, 0, 0, 0], np.float32)
+            buttons = np.array([0, 0, 0, 0, held], np.int32)
             header = types.header(both.clock.wall(), "")
             joy.publish(types.make(kind, header=header, axes=axes, buttons=buttons))
             both.delivered()
