@@ -28,7 +28,8 @@ def main() -> None:
     for name, rows in found.items():
         if name[:1] == "-":
             continue
-        text = f"{tables.summary(rows)} {tables.goals(options.profile)}\n\n{tables.table(rows)}"
+        shown = tables.beyond(rows) if name else tables.table(rows)
+        text = f"{tables.summary(rows)} {tables.goals(options.profile)}\n\n{shown}"
         print(f"{name or 'guarded'}: {text}\n")
         if options.write:
             title = f"faults {name or 'guarded'}"
@@ -38,8 +39,6 @@ def main() -> None:
         print(text)
         if options.write:
             insert(PAGE, "faults each", f"{conditions(options, 'each')}\n\n{text}")
-    if options.write:
-        insert(PAGE, "kinds", tables.kinds_table())
     if options.kind and options.seed is not None:
         print(json.dumps(next(iter(found.values())), indent=1))
 

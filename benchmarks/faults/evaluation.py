@@ -40,10 +40,6 @@ MOVES_TIP = {
     if kind.target is Target.PHYSICS or name.startswith("axis_") or name == "encoder_jump"
 }
 """Kinds in which motors, endoscope or tissue move the tip by themselves."""
-HAS_ENVELOPE = (
-    MOVES_TIP | {name for name, kind in KINDS.items() if kind.target is Target.REFERENCE}
-) - INPUT_PAUSED
-"""Kinds with an envelope: `MOVES_TIP`, and those in which the input device reports wrongly."""
 
 
 @dataclass(frozen=True)

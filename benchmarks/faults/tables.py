@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from faults.evaluation import HAS_ENVELOPE, TRANSIENT_GOAL, Outcome, classify, permanent_goal
+from faults.evaluation import TRANSIENT_GOAL, Outcome, classify, permanent_goal
 from faults.scenarios import SLACK
 from tautscope.twin.faults import KINDS
 
@@ -70,48 +70,45 @@ def seeds(rows: Sequence[Row]) -> str:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return the table of kinds, transient and permanent faults apart."""
+    """Return a line per kind: what it is, worst excursions, detection, and what the loop did."""
     lines = [
-        "| fault | hazard | permanent | N | k | worst excursion [mm, rad, rad] | tip [mm] "
-        f"| detection time, median (worst) [s] | detected | {' | '.join(ENDINGS)} "
-        "| highest reactions |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| fault | hazard | what it is | runs | beyond | SILENT | transient: worst [mm, rad, rad] "
+        "| permanent: worst | detected, median of the time [s] | highest reactions |",
+        "|---|---|---|--:|--:|--:|---|---|---|---|",
     ]
     for name, kind in KINDS.items():
-        for own, permanent in zip(
-            by_duration(row for row in rows if row["kind"] == name), ("", "yes"), strict=True
-        ):
-            if own:
-                lines.append(f"| {name} | {kind.hazard} | {permanent} | {_cells(own)} |")
+        if own := [row for row in rows if row["kind"] == name]:
+            low, high = kind.severity
+            what = kind.what + (f": {low:g} to {high:g} {kind.unit}" if kind.unit else "")
+            cells = (name, kind.hazard, what, *_cells(own))
+            lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
 
-def _cells(own: Sequence[Row]) -> str:
-    excursion = np.array([row["excursion"] for row in own]).max(axis=0)
+def _cells(own: Sequence[Row]) -> list[Any]:
     times = [row["detected"] for row in own if row["detected"] is not None]
-    ended = Counter(row["ending"] for row in own)
     reached = Counter(row["reaction"] for row in own if row["reaction"] != "none")
-    cells = [
+    return [
         len(own),
-        sum(row["beyond"] for row in own),
-        f"{1e3 * excursion[0]:.2f}, {excursion[1]:.3f}, {excursion[2]:.3f}",
-        f"{1e3 * max(row['tip'][0] for row in own):.2f}" if own[0]["kind"] in HAS_ENVELOPE else "",
-        f"{np.median(times):.2f} ({max(times):.2f})" if times else "",
-        len(times),
-        *(ended[name] or "" for name in ENDINGS),
-        ", ".join(f"{name} {count}" for name, count in reached.most_common(3)),
+        sum(row["beyond"] for row in own) or "",
+        sum(row["ending"] == "SILENT" for row in own) or "",
+        *(_excursion(part) for part in by_duration(own)),
+        f"{len(times)}, {np.median(times):.2f}" if times else "0",
+        ", ".join(f"{name} {count}" for name, count in reached.most_common(2)),
     ]
-    return " | ".join(str(cell) for cell in cells)
 
 
-def kinds_table() -> str:
-    """Return the table that describes each kind."""
-    lines = ["| fault | target | mode | severity | description |", "|---|---|---|---|---|"]
-    for kind in KINDS.values():
-        low, high = kind.severity
-        size = f"{low:g} to {high:g} {kind.unit}" if kind.unit else ""
-        lines.append(f"| {kind.name} | {kind.target} | {kind.mode} | {size} | {kind.what} |")
-    return "\n".join(lines)
+def _excursion(rows: Sequence[Row]) -> str:
+    if not rows:
+        return ""
+    worst = np.array([row["excursion"] for row in rows]).max(axis=0)
+    return f"{1e3 * worst[0]:.2f}, {worst[1]:.2f}, {worst[2]:.2f}"
+
+
+def beyond(rows: Sequence[Row]) -> str:
+    """Return how many runs of each kind are beyond the goal."""
+    found = Counter(row["kind"] for row in rows if row["beyond"])
+    return f"Beyond: {', '.join(f'{name} {count}' for name, count in found.most_common())}."
 
 
 def off_table(found: dict[str, Sequence[Row]]) -> str:

@@ -32,9 +32,18 @@ IDEAS: dict[str, dict[str, Any]] = {
 }
 """Name of each idea, and the configuration changes that disable it."""
 
-NOTABLE = {"share": 0.01, "periods": 0.5, "strokes": 0.5}
-"""Smallest loss that the table shows, by unit; otherwise 5 % of the goal, or of the value of
-the profile where there is no goal."""
+SHOWN = {
+    "operator: reduction of tracking error": "operator: reduction [%]",
+    "operator: largest error": "largest error [mm, rad]",
+    "operator: tip overspeed": "tip overspeed",
+    "disturbed operator: reduction of tracking error": "with tremor, flicks, pauses: reduction [%]",
+    "reduction of max width": "sines: reduction of the largest width [%]",
+    "start": "start [periods]",
+    "three DOFs at once: reduction": "three DOFs at once: reduction [%]",
+    "width 10-2-10 mm: overshoot": "width 10-2-10 mm: overshoot [mm]",
+    "tremor at rest: tip": "tremor at rest: tip [mm]",
+}
+"""Quantities of the table, and their titles."""
 
 
 def compare(rows: Sequence[Row]) -> list[Row]:
@@ -64,23 +73,16 @@ def compare(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def is_notable(row: Row) -> bool:
-    """Return whether the value is notably worse without the idea."""
-    if row["worse"] is None:
-        return row["without"] is None
-    scale = row["best"] if row["goal"] is None else row["goal"]
-    return bool(row["worse"] >= NOTABLE.get(row["unit"], 0.05 * scale))
-
-
 def table(losses: Sequence[Row]) -> str:
-    """Return a Markdown table: for each idea, the quantities that get worse without it."""
-    lines = ["| without | what gets worse | DOF | `best` | without |", "|---|---|---|---|---|"]
-    for idea in dict.fromkeys(row["idea"] for row in losses):
-        mine = [row for row in losses if row["idea"] == idea and is_notable(row)]
-        if not mine:
-            lines.append(f"| {idea} | nothing | | | |")
-        for row in mine:
-            best, without = (show(row[key], row["unit"]) for key in ("best", "without"))
-            missed = " (goal lost)" if row["held"] and not row["holds"] else ""
-            lines.append(f"| {idea} | {row['what']} | {row['dof']} | {best} | {without}{missed} |")
+    """Return a Markdown table: a line per idea with its values, the whole profile first."""
+    lines = [f"| without | {' | '.join(SHOWN.values())} |", "|---" * (len(SHOWN) + 1) + "|"]
+    found: dict[str, dict[str, list[str]]] = {}
+    for row in losses:
+        for name, key in (("nothing", "best"), (row["idea"], "without")):
+            mine = found.setdefault(name, {}).setdefault(row["what"], [])
+            if name != "nothing" or row["idea"] == losses[0]["idea"]:
+                mine.append(show(row[key], row["unit"]).removesuffix(" %"))
+    for name, mine in found.items():
+        cells = (" / ".join(mine.get(what, [])) for what in SHOWN)
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)

@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from hysteresis.goals import GOALS
+from hysteresis.goals import CONDITIONS, GOALS
 from tautscope.dof import Dof
 
 Row = dict[str, Any]
@@ -112,21 +112,51 @@ def plain(rows: Sequence[Row]) -> str:
 
 
 def full(rows: Sequence[Row]) -> str:
-    """Return a Markdown table of every row, both profiles side by side."""
-    lines = ["| what | DOF | `paper` | `best` | goal |", "|---|---|---|---|---|"]
-    cells: dict[tuple[str, str], dict[str, Row]] = {}
+    """Return a Markdown table: a line per quantity with the values of its DOFs."""
+    cells: dict[str, dict[str, list[Row]]] = {}
     for row in rows:
-        cells.setdefault((row["what"], row["dof"]), {})[row["profile"]] = row
-    for (what, dof), mine in cells.items():
-        shown = []
-        for name in ("paper", "best"):
-            if name in mine:
-                unit, steady = mine[name]["unit"], mine[name]["steady"]
-                values = (show(mine[name][key], unit) for key in ("median", "worst"))
-                shown.append("{} ({})".format(*values) + (" (!)" if steady is False else ""))
-            else:
-                shown.append("")
-        last = mine.get("best") or mine["paper"]
-        unit = "" if last["unit"] == "share" else f" [{last['unit']}]"
-        lines.append(f"| {what}{unit} | {dof} | {shown[0]} | {shown[1]} | {goal(last)} |")
+        cells.setdefault(row["what"], {}).setdefault(row["profile"], []).append(row)
+    conditions = [cells.pop(f"{name}: change of reduction", {}) for name in CONDITIONS]
+    if any(conditions):
+        every = [found["best"] for found in conditions if found]
+        cells[f"{len(every)} image conditions: largest change of reduction"] = {
+            "best": [max(own, key=_distance) for own in zip(*every, strict=True)]
+        }
+    lines = ["| what | `best` | `paper` | goal |", "|---|---|---|---|"]
+    for what, mine in cells.items():
+        shown = [_triple(mine.get(name, ())) for name in ("best", "paper")]
+        units = {
+            unit: None for row in next(iter(mine.values())) if (unit := row["unit"]) != "share"
+        }
+        title = what + (f" [{', '.join(units)}]" if units else "")
+        lines.append(f"| {title} | {shown[0]} | {shown[1]} | {_goals(mine.get('best', ()))} |")
     return "\n".join(lines)
+
+
+def _distance(row: Row) -> float:
+    return float("inf") if row["median"] is None else row["median"]
+
+
+def _triple(rows: Sequence[Row]) -> str:
+    """Medians and worst values of the DOFs of a quantity."""
+    median_, worst = (
+        " / ".join(show(row[key], row["unit"]).removesuffix(" %") for row in rows)
+        for key in ("median", "worst")
+    )
+    return f"{median_} ({worst})" + (" %" if rows[0]["unit"] == "share" else "") if rows else ""
+
+
+def _goals(rows: Sequence[Row]) -> str:
+    """The goal of a quantity, and the DOFs that miss it."""
+    limits = list(dict.fromkeys(row["goal"] for row in rows))
+    if limits in ([], [None]):
+        return ""
+    bound = "at least" if rows[0]["sense"] == "min" else "at most"
+    unit = rows[0]["unit"]
+    text = " / ".join(show(limit, unit).removesuffix(" %").removesuffix(".0") for limit in limits)
+    missed = ", ".join(row["dof"] for row in rows if not row["holds"])
+    return (
+        f"{bound} {text}"
+        + (" %" if unit == "share" else "")
+        + (f"; missed: {missed}" if missed else "")
+    )

@@ -85,16 +85,38 @@ def test_an_ablation_shows_what_gets_worse() -> None:
     idea = next(iter(ablation.IDEAS))
     found = rows(
         {
-            (NAME, Dof.INSERTION, "best"): [0.99],
-            (NAME, Dof.INSERTION, idea): [0.8],
+            ("reduction of max width", Dof.INSERTION, "best"): [0.99],
+            ("reduction of max width", Dof.INSERTION, idea): [0.8],
+            ("reduction of max width", Dof.ROTATION, "best"): [0.98],
+            ("reduction of max width", Dof.ROTATION, idea): [0.79],
             ("start", Dof.INSERTION, "best"): [1.0],
-            ("start", Dof.INSERTION, idea): [1.0],
+            ("start", Dof.INSERTION, idea): [3.0],
         }
     )
     losses = ablation.compare(found)
-    assert [row["worse"] for row in losses] == pytest.approx([0.19, 0.0])
-    assert [ablation.is_notable(row) for row in losses] == [True, False]
-    assert "99.0 % | 80.0 % (goal lost)" in ablation.table(losses)
+    assert [row["worse"] for row in losses] == pytest.approx([0.19, 0.19, 2.0])
+    name, start = (
+        list(ablation.SHOWN).index(what) + 1 for what in ("reduction of max width", "start")
+    )
+    whole, without = (line.split(" | ") for line in ablation.table(losses).splitlines()[2:])
+    assert (whole[name], without[name]) == ("99.0 / 98.0", "80.0 / 79.0")
+    assert (whole[start], without[start]) == ("1", "3")
+
+
+def test_a_line_of_the_page_has_every_dof_and_what_misses_the_goal() -> None:
+    found = rows(
+        {
+            (NAME, Dof.INSERTION, "best"): [0.99, 0.97],
+            (NAME, Dof.ROTATION, "best"): [0.9, 0.8],
+            ("smoke: change of reduction", Dof.INSERTION, "best"): [0.01],
+            ("stool: change of reduction", Dof.INSERTION, "best"): [0.02],
+        }
+    )
+    first, last = tables.full(found).splitlines()[2:]
+    assert first == f"| {NAME} | 98.0 / 85.0 (97.0 / 80.0) % |  | at least 95 %; missed: rotation |"
+    assert last == (
+        "| 2 image conditions: largest change of reduction | 2.0 (2.0) % |  | at most 3 % |"
+    )
 
 
 def test_whole_periods_end_with_the_reference() -> None:
