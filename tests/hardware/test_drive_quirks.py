@@ -42,11 +42,6 @@ class Mode0UntilEnabled(SimulatedDrive):
         self._update_statusword()
 
 
-class ModeNeverShown(SimulatedDrive):
-    def on_write(self, key: tuple[int, int], value: int, now: float) -> int | None:
-        return None if key == (0x6060, 0) else super().on_write(key, value, now)
-
-
 def supports(modes: int) -> type[SimulatedDrive]:
     """A drive that has modes 7 and 8, but says something else in 0x6502."""
 
@@ -80,6 +75,11 @@ def shows(set_bits: int, cleared: int = 0) -> type[SimulatedDrive]:
             self.values[0x6041, 0] = (self.values[0x6041, 0] | set_bits) & ~cleared
 
     return Drive
+
+
+class ModeNeverShown(shows(1 << 12)):  # type: ignore[misc]
+    def on_write(self, key: tuple[int, int], value: int, now: float) -> int | None:
+        return None if key == (0x6060, 0) else super().on_write(key, value, now)
 
 
 class SetOnce(SimulatedDrive):
@@ -219,10 +219,14 @@ def test_protections_of_the_other_drives_stay(hub: Hub, bench: Bench) -> None:
 
 
 def test_silent_drive_without_heartbeat_is_noticed_by_its_answers(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), **QUICK, waive=["1017"])
+    times = QUICK | {"heartbeat_timeout": 0.3}
+    config = drives_config(channel=str(hub.path), **times, waive=["1017"])
     rig = bench(config, absent=(0x1017,))
     with open_drives(config) as drives:
         command = drives.start()
+        for _ in range(round(2 * config.heartbeat_timeout / config.cycle)):
+            drives.exchange(np.asarray(command))
+            time.sleep(drives.cycle)
         rig.inject("drop", Dof.ROTATION)
         with pytest.raises(DriveError, match=r"rotation, node 2: no answer to \d+ set-points"):
             for _ in range(1000):

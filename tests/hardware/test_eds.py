@@ -110,7 +110,9 @@ def insert(line: str, section: str) -> Callable[[str], str]:
 
 DAMAGES: dict[str, Callable[[str], str | bytes]] = {
     "cp1252": lambda text: ("; Antrieb f\xfcr gr\xf6\xdfere \x80\n" + text).encode("latin-1"),
-    "byte order mark": lambda text: text.encode("utf-8-sig"),
+    "byte order mark": lambda text: (
+        "[DeviceInfo]\nVendorNumber=0x9A\n" + text.replace("[DeviceInfo]", "[Other]")
+    ).encode("utf-8-sig"),
     "UTF-16": lambda text: text.encode("utf-16"),
     "CRLF": lambda text: text.replace("\n", "\r\n"),
     "blank PDOMapping": lambda text: re.sub("PDOMapping=.*", "PDOMapping=", text),

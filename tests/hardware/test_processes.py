@@ -191,7 +191,6 @@ def background(nothing: str, *arguments: str) -> Iterator[tuple[subprocess.Popen
     try:
         assert "ready" in shell.stdout.readline()
         yield shell, job
-        shell.stdout.read()
         shell.wait(TIMEOUT)
     finally:
         with suppress(ProcessLookupError):

@@ -13,26 +13,19 @@ def read_requests() -> Iterator[str]:
     """Lines of the standard input; from an input that is nothing, none until a signal comes.
 
     Nothing are the null device, which shells give to a background process (``bench &``), a closed
-    input, and the terminal of a process in the background: reading it would stop the process.
+    input, and the terminal of a process in the background.
     """
-    if not _is_nothing():
-        try:
+    # Reading a terminal in the background fails then, instead of stopping the process.
+    signal.signal(signal.SIGTTIN, signal.SIG_IGN)
+    try:
+        if not _is_nothing():
             yield from sys.stdin
-        except OSError:
-            pass  # the terminal, after the process went to the background
-        else:
             return
+    except OSError:
+        pass
     while True:
         signal.pause()
 
 
 def _is_nothing() -> bool:
-    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # reading fails then
-    if sys.stdin is None:
-        return True
-    try:
-        if os.isatty(0):
-            return os.tcgetpgrp(0) != os.getpgrp()
-        return os.path.samestat(os.fstat(0), Path(os.devnull).stat())
-    except OSError:
-        return True
+    return sys.stdin is None or os.path.samestat(os.fstat(0), Path(os.devnull).stat())

@@ -189,7 +189,8 @@ class CanopenFieldbus:
             self._master.is_monitoring = False
             for dof in Dof:
                 try:
-                    self._set_or_waive(dof, objects.CONSUMER_HEARTBEAT, 0)
+                    with suppress(SettingRefusedError):  # it may lack the object
+                        self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
                 except DriveError:
                     break  # the bus may be lost; do not wait for the other drives
         self._network.bus = None
