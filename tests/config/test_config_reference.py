@@ -49,7 +49,7 @@ def test_uncommented_drives_need_only_what_is_required() -> None:
         text,
         flags=re.MULTILINE,
     )
-    drives = tomllib.loads(re.sub(r"^(eds|model|stops) =$", "", text, flags=re.MULTILINE))
+    drives = tomllib.loads(re.sub(r"^(eds|model|stops|preset) =$", "", text, flags=re.MULTILINE))
     config = msgspec.convert(drives["drives"], type(load_config("bench").drives))
     assert (
         config.cycle

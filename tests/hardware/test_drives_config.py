@@ -17,7 +17,6 @@ from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.drives import open_drives
-from tautscope.hardware.object_dictionary import device_profile, eds_text, load_eds
 from tautscope.hardware.scale import Scale
 
 
@@ -77,20 +76,6 @@ def test_unusable_eds_file(tmp_path: Path, text: str | None) -> None:
         open_drives(drives_config(**rotation(eds=str(file))))
     assert found.value.field == "drives.rotation.eds"
     assert found.value.value == str(file)
-
-
-def test_generated_eds_file_matches_the_table(tmp_path: Path) -> None:
-    """Read by the `canopen` library."""
-    file = tmp_path / "drive.eds"
-    file.write_text(eds_text(5), encoding="utf-8")
-    dictionary = load_eds(str(file), 5)
-    for entry in device_profile(5):
-        found = dictionary.get_variable(entry.index, entry.subindex)
-        assert found is not None, str(entry)
-        assert (found.data_type, len(found)) == (entry.data_type, 8 * entry.size), str(entry)
-        assert found.access_type == entry.access
-        assert found.default == entry.default, str(entry)
-        assert found.pdo_mappable == entry.mappable
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drive_settings import drives_config
+from drive_settings import AXES, drives_config
 from tautscope.bench.drives import SimulatedDrive
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
@@ -268,6 +268,12 @@ def test_refused_settings_and_states() -> None:
     for slave in master.slaves:
         del slave.drive.entries[0x607D, 1]
     with pytest.raises(SettingRefusedError, match="add 607D"):
+        Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
+
+    soem, master, _ = line()
+    coarse = AXES["rotation"] | {"counts_per_unit": 2.7e8}
+    config = drives_config(**QUICK, rotation=coarse)
+    with pytest.raises(SettingRefusedError, match=r"cannot hold 5400000000 in 4.*add 607F"):
         Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
 
     soem, master, config = line()

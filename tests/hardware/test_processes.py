@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
 import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
 
 import pytest
 from drive_settings import drives_document
-from tautscope.config import dump_config, from_document
+from tautscope.config import dump_config, from_document, load_config
 from waiting import TIMEOUT
 
 DOFS = {"insertion", "rotation", "bending"}
@@ -155,3 +158,88 @@ def test_fault_injected_through_standard_input(
         assert master.wait(TIMEOUT) == 1
         assert master.stderr is not None
         assert "EmergencyError: bending, node 3: emergency 0x4310" in master.stderr.read()
+
+
+TERMINAL = """
+import fcntl, subprocess, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+job = subprocess.Popen([sys.executable, *sys.argv[1:]], process_group=0)
+print(job.pid, flush=True)
+sys.exit(job.wait())
+"""
+"""As a shell with job control does on a terminal."""
+BACKGROUND = {
+    "null device": ["sh", "-c", '"$0" "$@" & echo $!; wait $!', sys.executable],
+    "closed": ["sh", "-c", '"$0" "$@" <&- & echo $!; wait $!', sys.executable],
+    "terminal": [sys.executable, "-c", TERMINAL],
+}
+"""Shells that start a process in the background and print its number."""
+
+
+@contextmanager
+def background(nothing: str, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    ours, theirs = pty.openpty()
+    shell = subprocess.Popen(
+        [*BACKGROUND[nothing], *arguments],
+        stdin=theirs,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert shell.stdout is not None
+    job = int(shell.stdout.readline())
+    try:
+        assert "ready" in shell.stdout.readline()
+        yield shell, job
+        shell.wait(TIMEOUT)
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(job, signal.SIGKILL)
+        shell.wait()
+        shell.stdout.close()
+        os.close(ours)
+        os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("nothing", "ending", "status"),
+    [
+        ("null device", signal.SIGINT, 0),
+        ("closed", signal.SIGTERM, 128 + signal.SIGTERM),
+        ("terminal", signal.SIGTERM, 128 + signal.SIGTERM),
+    ],
+)
+def test_drives_in_the_background_serve_a_master_until_a_signal(
+    tmp_path: Path, nothing: str, ending: signal.Signals, status: int
+) -> None:
+    socket, file = tmp_path / "can", tmp_path / "rig.toml"
+    config = from_document({"drives": drives_document(channel=str(socket))})
+    file.write_text(dump_config(config), encoding="utf-8")
+    arguments = ("-m", "tautscope.bench.drives", "--config", str(file), "--socket", str(socket))
+    with background(nothing, *arguments) as (shell, job):
+        with process(MASTER, str(file), "return") as (master, _):
+            assert master.wait(TIMEOUT) == 0
+        assert shell.poll() is None
+        os.kill(job, ending)
+    assert shell.returncode == status
+    assert not socket.exists()
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
+def test_bench_in_the_background_ends_with_a_signal(tmp_path: Path, ending: signal.Signals) -> None:
+    """`tautscope bench &`: it goes on without input, and leaves no socket behind."""
+    can, video, file = tmp_path / "can", tmp_path / "video", tmp_path / "rig.toml"
+    changes = {"drives.channel": str(can), "camera.source.url": f"unix:{video}"}
+    file.write_text(dump_config(load_config("bench").replace(**changes)), encoding="utf-8")
+    with background("null device", "-m", "tautscope", "bench", "--config", str(file)) as (
+        shell,
+        job,
+    ):
+        time.sleep(0.3)  # an input that has ended would have ended it
+        assert shell.poll() is None
+        assert can.exists()
+        assert video.exists()
+        os.kill(job, ending)
+    assert shell.returncode == (128 + ending if ending is signal.SIGTERM else 0)
+    assert not can.exists()
+    assert not video.exists()

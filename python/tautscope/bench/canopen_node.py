@@ -136,7 +136,7 @@ class CanopenNode:
                 self.on_stopped(now)
 
     def _receive_heartbeat(self, node: int, now: float) -> None:
-        consumer = self.values[0x1016, 1]
+        consumer = self.values.get((0x1016, 1), 0)
         if consumer >> 16 & 0x7F == node and consumer & 0xFFFF:
             self.heartbeat_deadline = now + (consumer & 0xFFFF) / 1e3
 

@@ -4,7 +4,7 @@
 
 ``python -m tautscope.bench.drives --config FILE --socket PATH`` runs them in a process: it reads
 faults from its standard input, one per line (``freeze rotation``, ``clear rotation``), writes
-events as JSON lines, and ends with its input.
+events as JSON lines, and ends with its input, as ``tautscope bench``.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import argparse
 import heapq
 import itertools
 import json
-import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Literal, get_args
 
 import can
@@ -27,10 +27,12 @@ from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.motors import SimulatedMotors
+from tautscope.bench.requests import read_requests
 from tautscope.config import DrivesConfig, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.cia402 import State
+from tautscope.hardware.signals import exit_on_signals
 
 FaultKind = Literal["drop", "delay", "fault", "freeze", "heartbeat", "refuse"]
 """drop: neither sends nor receives. delay: sends late. fault: emergency object and fault state.
@@ -177,15 +179,16 @@ def main() -> None:
     if config is None:
         raise ConfigError("drives", None, "a section [drives]")
     start, modes = np.array(arguments.start), tuple(arguments.modes)
-    with Hub(arguments.socket), LocalBus(arguments.socket) as bus:
+    with exit_on_signals(), Hub(arguments.socket), LocalBus(arguments.socket) as bus:
         drives = SimulatedDrives(bus, config, start=start, modes=modes)
         with drives:
             printer = EventPrinter(lambda: drives.events)
             print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-            for line in sys.stdin:
-                kind, label = line.split()
-                dof = Dof[label.upper()]
-                drives.clear(dof) if kind == "clear" else drives.inject(kind, dof)  # type: ignore[arg-type]
+            with suppress(KeyboardInterrupt):
+                for line in read_requests():
+                    kind, label = line.split()
+                    dof = Dof[label.upper()]
+                    drives.clear(dof) if kind == "clear" else drives.inject(kind, dof)  # type: ignore[arg-type]
         printer.close()
 
 

@@ -28,7 +28,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
         description="Run a simulated rig for another process: the simulated instrument behind "
         "three CiA 402 drives on a CAN bus, or servos on a serial line (--config bench_dynamixel, "
         "bench_feetech), and a camera stream, in real time. Ends with its input, "
-        "or Ctrl-C. A line of input injects a fault: KIND PART, with the part insertion, rotation, "
+        "Ctrl-C or SIGTERM; in the background, where it has no input, with a signal only. "
+        "A line of input injects a fault: KIND PART, with the part insertion, rotation, "
         "bending (drop, delay, fault, freeze; drives also heartbeat, refuse; servos also restart) "
         "or camera (drop, delay, fault: "
         "unplugged, freeze, board: a calibration board is shown); clear PART ends it. Events are "
@@ -73,6 +74,7 @@ def _fault(text: str) -> tuple[float, str]:
 
 def _bench(options: argparse.Namespace) -> None:
     from tautscope.bench.events import EventPrinter  # noqa: PLC0415
+    from tautscope.bench.requests import read_requests  # noqa: PLC0415
     from tautscope.bench.rig import Bench  # noqa: PLC0415
     from tautscope.hardware.realtime import (  # noqa: PLC0415
         SETPOINTS,
@@ -102,7 +104,7 @@ def _bench(options: argparse.Namespace) -> None:
         )
         injector.start()
         try:
-            for line in sys.stdin:
+            for line in read_requests():
                 try:
                     bench.request(line)
                 except ConfigError as error:

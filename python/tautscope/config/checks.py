@@ -183,7 +183,16 @@ def check_topics(
             _require(kinematics.kind != "joints", "kinematics.kind", kinematics.kind, allowed)
 
 
-_OF_CIA_402 = ("interface", "options", "lead_points", "master_node", "heartbeat_period", "waive")
+_OF_CIA_402 = (
+    "interface",
+    "options",
+    "lead_points",
+    "master_node",
+    "heartbeat_period",
+    "preset",
+    "interpolation_time",
+    "waive",
+)
 """Keys of [drives] that servos do not use."""
 _OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
 """Keys of a motor that only servos use."""
@@ -203,7 +212,7 @@ def _check_drives(drives: DrivesConfig) -> None:
             max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,
             f"{path}.counts_per_unit",
             axis.counts_per_unit,
-            f"less than 2^31 counts over the travel {axis.travel}",
+            f"less than 2^31 counts from home = {axis.home} to both ends of travel = {axis.travel}",
         )
         _require_at_most(path, axis, "following_window", "following_error")
         if drives.protocol in PORTS:

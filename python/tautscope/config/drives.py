@@ -10,6 +10,32 @@ from tautscope.config.fields import Fraction, Positive
 from tautscope.config.section import Section
 from tautscope.dof import Dof
 
+Preset = Literal["copley", "elmo_gold", "elmo_whistle", "epos4"]
+"""Makers' drives, see `tautscope.config.presets`."""
+Waiver = Literal[
+    "1016", "1017", "6007", "6041.12", "6041.13", "605A", "6061", "607D", "607F", "60C2", "6502"
+]
+"""What `DrivesConfig.waive` may name: an object, or a bit of the statusword (0x6041)."""
+WAIVERS: dict[Waiver, str] = {
+    "1016": "another protection stops the motors when this computer fails",
+    "1017": "its answers to set-points are enough to supervise it",
+    "6007": "another protection stops the motors when this computer fails",
+    "6041.12": "its manual says that bit 12 of the statusword stays 0 in this mode",
+    "6041.13": "its manual gives bit 13 of the statusword another meaning than a following error",
+    "605A": "its quick stop is the wanted one without this setting",
+    "6061": "its manual says that it shows the mode only while it is enabled",
+    "607D": "another protection limits its travel",
+    "607F": "it counts speeds in another unit than counts/s, or has no such limit",
+    "60C2": "the time between its set-points is drives.cycle without this setting",
+    "6502": "its manual says that it has mode 8 or 7",
+}
+"""When each waiver is right; it completes "if ..." in messages."""
+
+
+def waiver_hint(waiver: Waiver) -> str:
+    """When to add a waiver, for messages."""
+    return f"If {WAIVERS[waiver]}, add {waiver} to drives.waive"
+
 
 class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One motor and its drive.
@@ -102,9 +128,18 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Fraction of `speed_limit` for the move to the start of a run."""
     after_quick_stop: Literal["hold", "release"] = "hold"
     """Whether the motor is held or released after a quick stop."""
-    waive: tuple[Literal["6007", "605A", "607D"], ...] = ()
-    """Protections that the drives lack and the run does without: reaction to a lost connection
-    (6007), quick stop option (605A), position limits (607D)."""
+    preset: Preset | None = None
+    """Settings of a maker's drives. The keys of this section replace those of the preset, except
+    that waivers add up."""
+    interpolation_time: bool = False
+    """Whether the cycle is set (0x60C2) in mode 8 too, for drives that interpolate by it."""
+    waive: tuple[Waiver, ...] = ()
+    """What the drives lack and the run does without. Protections: heartbeat of the master (1016),
+    heartbeat of the drive (1017), reaction to a lost connection (6007), quick stop option (605A),
+    position limits (607D); 607F: speed limits (also 6080), which are not set. What is not
+    checked: supported modes (6502: 8, else 7, is tried), mode display until the drive is enabled
+    (6061), interpolation time (60C2), bit 12 (follows set-points) or 13 (following error) of the
+    statusword (6041.12, 6041.13)."""
 
     def __getitem__(self, dof: Dof) -> AxisConfig:
         """Settings of one DOF."""

@@ -1,6 +1,6 @@
 """CiA 402 drives on a CAN bus (CANopen, CiA 301).
 
-SDO transfers and EDS files go through the `canopen` library, process data through
+SDO transfers go through the `canopen` library, process data through
 `tautscope.hardware.canopen_master`.
 
 There is no thread: `exchange` sends the master's heartbeat, so that the drives detect a control
@@ -37,15 +37,18 @@ from tautscope.hardware.canopen_master import (
     open_bus,
 )
 from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.eds import load_eds
 from tautscope.hardware.fieldbus import (
     TX_PDO_OBJECTS,
     AbsentError,
     Feedback,
     abort_error,
+    encoded,
+    require_waived,
     target_object,
     verify_setting,
 )
-from tautscope.hardware.object_dictionary import Entry, load_eds
+from tautscope.hardware.object_dictionary import Entry
 
 EVENT_DRIVEN, AT_EVERY_SYNC = 255, 1
 """PDO transmission types."""
@@ -123,12 +126,7 @@ class CanopenFieldbus:
         """Write a value by SDO download; see `Fieldbus.write`."""
         known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
         size = len(known) // 8 if known is not None and known.fixed_size else entry.size
-        try:
-            data = value.to_bytes(size, "little", signed=entry.signed)
-        except OverflowError:
-            raise SettingRefusedError(
-                self.name(dof), f"{entry} cannot hold {value}", "Check the drive's EDS file"
-            ) from None
+        data = encoded(self.name(dof), entry, value, size)
         what = f"{entry} = {value}"
         self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
 
@@ -140,10 +138,10 @@ class CanopenFieldbus:
             self._master.send_nmt(PRE_OPERATIONAL, node.id)
             period = round(config.heartbeat_period * 1e3)
             timeout = round(config.heartbeat_timeout * 1e3)
-            self._set(dof, objects.PRODUCER_HEARTBEAT, period)
+            node.has_heartbeat = self._set_or_waive(dof, objects.PRODUCER_HEARTBEAT, period)
             # Some drives refuse a second consumer entry for the same producer.
-            self._set(dof, objects.CONSUMER_HEARTBEAT, 0)
-            self._set(dof, objects.CONSUMER_HEARTBEAT, config.master_node << 16 | timeout)
+            for value in (0, config.master_node << 16 | timeout):
+                self._set_or_waive(dof, objects.CONSUMER_HEARTBEAT, value)
             self._map(dof, 0x1400, RX_PDO_1, EVENT_DRIVEN, (objects.CONTROLWORD,))
             self._map(dof, 0x1401, RX_PDO_2, AT_EVERY_SYNC, (target_object(modes[dof]),))
             self._map(dof, 0x1800, TX_PDO_1, AT_EVERY_SYNC, TX_PDO_OBJECTS)
@@ -191,7 +189,8 @@ class CanopenFieldbus:
             self._master.is_monitoring = False
             for dof in Dof:
                 try:
-                    self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
+                    with suppress(SettingRefusedError):  # it may lack the object
+                        self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
                 except DriveError:
                     break  # the bus may be lost; do not wait for the other drives
         self._network.bus = None
@@ -222,6 +221,15 @@ class CanopenFieldbus:
     def _set(self, dof: Dof, entry: Entry, value: int) -> None:
         self.write(dof, entry, value)
         verify_setting(self, dof, entry, value)
+
+    def _set_or_waive(self, dof: Dof, entry: Entry, value: int) -> bool:
+        """Set a value and read it back; False if that fails and is waived."""
+        try:
+            self._set(dof, entry, value)
+        except SettingRefusedError as error:
+            require_waived(self._config, entry, error)
+            return False
+        return True
 
     def _map(
         self, dof: Dof, base: int, cob: int, transmission_type: int, entries: tuple[Entry, ...]
@@ -269,7 +277,7 @@ class CanopenFieldbus:
 def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
     axis = config[dof]
     try:
-        return load_eds(axis.eds or "", axis.node)
+        return load_eds(axis.eds, axis.node)
     except (OSError, ValueError) as error:
         raise ConfigError(
             f"drives.{dof.label}.eds", axis.eds, f"a readable EDS file ({error})"

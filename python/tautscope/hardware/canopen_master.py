@@ -47,6 +47,7 @@ class Node:
         answered_at, heartbeat_at: Time of its last TxPDO and heartbeat [s, monotonic clock].
         nmt_state: NMT state in its last heartbeat.
         was_operational: Whether a heartbeat has reported operational.
+        has_heartbeat: Whether it sends heartbeats; else its answers alone are checked.
         controlword: The controlword sent last; None if it must be sent again.
         emergency: Its first emergency object that has not been reported.
     """
@@ -60,6 +61,7 @@ class Node:
     heartbeat_at: float = 0.0
     nmt_state: int = PRE_OPERATIONAL_STATE
     was_operational: bool = False
+    has_heartbeat: bool = True
     controlword: int | None = None
     emergency: bytes = b""
 
@@ -225,7 +227,7 @@ class CanopenMaster:
                     f"its NMT state is 0x{node.nmt_state:02X}, not operational (0x05)",
                     "It restarted or was stopped: check its supply",
                 )
-            if now - node.heartbeat_at > self._config.heartbeat_timeout:
+            if node.has_heartbeat and now - node.heartbeat_at > self._config.heartbeat_timeout:
                 raise HeartbeatError(
                     node.name,
                     f"no heartbeat for {(now - node.heartbeat_at) * 1e3:.0f} ms",

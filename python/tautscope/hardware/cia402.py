@@ -59,6 +59,8 @@ STOPPED_STATES = frozenset(
 POWER_OFF_STATES = frozenset({State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT})
 """States in which no voltage is applied to the motor."""
 
+REMOTE = 1 << 9
+"""Statusword: the drive obeys the controlword; many drives leave it 0 and obey nevertheless."""
 FOLLOWS_COMMAND = 1 << 12
 """Statusword: drive follows the command value (mode 8), interpolation is active (mode 7)."""
 FOLLOWING_ERROR_BIT = 1 << 13

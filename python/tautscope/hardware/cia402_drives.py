@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from tautscope.config import DrivesConfig
+from tautscope.config.drives import waiver_hint
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, SilentDriveError, StateError
+from tautscope.errors import DriveError, StateError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.cia402_errors import ignores_setpoints, state_error, transition_error
 from tautscope.hardware.commissioning import commission
 from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
 from tautscope.hardware.fieldbus import AbsentError, Feedback, Fieldbus
@@ -69,7 +72,7 @@ class Cia402Drives:
 
     def status(self, dof: Dof) -> DriveStatus:
         """Read state, position, supported modes and identity."""
-        supported = self._bus.read(dof, objects.SUPPORTED_MODES)
+        supported = self._read_or_zero(dof, objects.SUPPORTED_MODES)
         state = cia402.state_of(self._bus.read(dof, objects.STATUSWORD))
         position = self._bus.read(dof, objects.POSITION_ACTUAL)
         vendor = self._read_or_zero(dof, objects.VENDOR_ID)
@@ -81,12 +84,15 @@ class Cia402Drives:
             )
         elif state is State.OPERATION_ENABLED:
             problem = "It is enabled: end the program that commands it, or power-cycle it"
-        elif not {7, 8} & set(modes):
-            problem = "It cannot follow a stream of positions; use another drive or firmware"
+        elif not {7, 8} & set(modes) and "6502" not in self._config.waive:
+            problem = (
+                "It does not say that it can follow a stream of positions (0x6502). "
+                f"{waiver_hint('6502')}; else use another drive or firmware"
+            )
         return DriveStatus(
             position,
             f"vendor 0x{vendor:X}; {state.value if state else 'unknown state'}; modes "
-            + ", ".join(f"{number} {MODES[number]}" for number in modes),
+            + (", ".join(f"{number} {MODES[number]}" for number in modes) or "unknown"),
             problem,
             self.serial_number(dof),
             {"vendor": vendor, "state": state.value if state else None, "modes": modes},
@@ -190,7 +196,18 @@ class Cia402Drives:
         return [self._bus.name(dof) for dof in pending]
 
     def _cycle(self) -> None:
-        self._feedback = self._bus.exchange(self._controlwords, self._targets)
+        feedback = self._bus.exchange(self._controlwords, self._targets)
+        if "6041.13" in self._config.waive:
+            feedback = [
+                replace(one, statusword=one.statusword & ~cia402.FOLLOWING_ERROR_BIT)
+                for one in feedback
+            ]
+        self._feedback = feedback
+
+    def _follows(self, feedback: Feedback) -> bool:
+        """Whether bit 12 is set or waived."""
+        is_waived = "6041.12" in self._config.waive
+        return is_waived or bool(feedback.statusword & cia402.FOLLOWS_COMMAND)
 
     def _paced_cycle(self) -> None:
         began = time.monotonic()
@@ -201,6 +218,7 @@ class Cia402Drives:
         """Cycle until `step` is true for every drive; each state has its own timeout."""
         seen: list[int | None] = [None] * 3
         since = [time.monotonic()] * 3
+        timeout = self._config.state_timeout
         while True:
             self._paced_cycle()
             all_done = True
@@ -211,8 +229,8 @@ class Cia402Drives:
                 all_done = all_done and is_done
                 if is_done or feedback.statusword != seen[dof]:
                     seen[dof], since[dof] = feedback.statusword, time.monotonic()
-                elif time.monotonic() - since[dof] > self._config.state_timeout:
-                    raise self._transition_error(dof, feedback)
+                elif time.monotonic() - since[dof] > timeout:
+                    raise transition_error(self._bus.name(dof), feedback, self._modes[dof], timeout)
             if all_done:
                 return
 
@@ -226,7 +244,7 @@ class Cia402Drives:
 
     def _enable(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
         if state is State.FAULT:
-            raise self._state_error(dof, feedback)
+            raise state_error(self._bus.name(dof), feedback)
         word = cia402.next_controlword(state)
         if word is not None:
             self._controlwords[dof] = word
@@ -236,53 +254,24 @@ class Cia402Drives:
 
     def _start_following(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
         if state is not State.OPERATION_ENABLED:
-            raise self._state_error(dof, feedback)
+            raise state_error(self._bus.name(dof), feedback)
         if self._modes[dof] is Mode.INTERPOLATED_POSITION:
             self._controlwords[dof] = cia402.ENABLE_INTERPOLATION
-        return bool(feedback.statusword & cia402.FOLLOWS_COMMAND)
+        is_entered = "6061" not in self._config.waive or feedback.mode == self._modes[dof]
+        return is_entered and self._follows(feedback)
 
     def _check_state(self, dof: Dof, feedback: Feedback) -> None:
         name, mode = self._bus.name(dof), self._modes[dof]
         if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
-            raise self._state_error(dof, feedback)
+            raise state_error(self._bus.name(dof), feedback)
         if feedback.mode != mode:
             raise StateError(
                 name,
                 f"it changed from mode {mode.value} to {feedback.mode}",
                 "End every other program that commands it",
             )
-        if not feedback.statusword & cia402.FOLLOWS_COMMAND:
-            raise StateError(
-                name,
-                f"it ignores set-points (statusword 0x{feedback.statusword:04X}, bit 12)",
-                "Check its limit switches and inputs; it may be halted",
-            )
-
-    def _transition_error(self, dof: Dof, feedback: Feedback) -> SilentDriveError | StateError:
-        """The error for a drive that does not reach the next state."""
-        if feedback.age:
-            return SilentDriveError(
-                self._bus.name(dof),
-                f"no answer to {feedback.age} set-points",
-                "Check its supply, and whether it supports synchronous PDOs",
-            )
-        return self._state_error(dof, feedback, "it stays in {}")
-
-    def _state_error(
-        self, dof: Dof, feedback: Feedback, what: str = "it is in {}, not operation enabled"
-    ) -> StateError:
-        """The error for a drive that is in the wrong state."""
-        state = cia402.state_of(feedback.statusword)
-        shown = "a state unknown to CiA 402" if state is None else state.value
-        if state in (State.FAULT, State.FAULT_REACTION):
-            remedy = "Look its error code (0x603F) up in the manual, then start with reset_faults"
-        else:
-            remedy = "Check its supply, its enable input and its limit switches"
-        return StateError(
-            self._bus.name(dof),
-            f"{what.format(shown)} (statusword 0x{feedback.statusword:04X})",
-            remedy,
-        )
+        if not self._follows(feedback):
+            raise ignores_setpoints(name, feedback)
 
     def _read_or_zero(self, dof: Dof, entry: Entry) -> int:
         try:

@@ -2,7 +2,8 @@
 
 Mode 8 (cyclic synchronous position) if the drive supports it, else 7 (interpolated position), the
 reaction to a lost connection, the quick stop option, position and velocity limits. The drive must
-use the default units of CiA 402: positions in counts, velocities in counts per second.
+use the default units of CiA 402: positions in counts, velocities in counts per second unless
+`drives.waive` has 607F.
 """
 
 from __future__ import annotations
@@ -11,19 +12,24 @@ import logging
 import time
 
 from tautscope.config import DrivesConfig
+from tautscope.config.drives import waiver_hint
 from tautscope.dof import Dof
 from tautscope.errors import ModeRefusedError, SettingRefusedError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.cia402_errors import mode_refused
 from tautscope.hardware.drive_group import CommissionedDrive
-from tautscope.hardware.fieldbus import AbsentError, Fieldbus, verify_setting
+from tautscope.hardware.fieldbus import (
+    AbsentError,
+    Fieldbus,
+    require_waived,
+    verify_setting,
+)
 from tautscope.hardware.object_dictionary import Entry
 from tautscope.hardware.scale import Scale
 
 _LOG = logging.getLogger(__name__)
-WAIVABLE = ("6007", "605A", "607D")
-"""Objects that `drives.waive` may name."""
 CIA_402 = 402
 """Device profile number, the low 16 bits of 0x1000."""
 
@@ -84,35 +90,48 @@ class _DriveSetup:
         lower, upper = self._scale.travel_counts()
         self._set(objects.MIN_POSITION_LIMIT, lower, required=True)
         self._set(objects.MAX_POSITION_LIMIT, upper, required=True)
-        self._set(objects.MAX_PROFILE_VELOCITY, speed)
+        has_speed_limits = "607F" not in self._config.waive
+        if has_speed_limits:
+            self._set(objects.MAX_PROFILE_VELOCITY, speed)
         # A drive compares with its present set-point only: allow for the travel during the lag.
         window = axis.following_error + self._config.lag * axis.speed_limit
         self._set(objects.FOLLOWING_ERROR_WINDOW, max(1, round(window * axis.counts_per_unit)))
         self._set(objects.FOLLOWING_ERROR_TIMEOUT, round(self._config.following_timeout * 1e3))
-        counts = self.read_or(objects.ENCODER_INCREMENTS, 0)
-        turns = self.read_or(objects.MOTOR_REVOLUTIONS, 0)
+        counts = turns = 0
+        if has_speed_limits:
+            counts = self.read_or(objects.ENCODER_INCREMENTS, 0)
+            turns = self.read_or(objects.MOTOR_REVOLUTIONS, 0)
         if counts and turns:
             self._set(objects.MAX_MOTOR_SPEED, -(-speed * 60 * turns // counts))  # [1/min]
 
     def enter_mode(self) -> Mode:
-        bus, dof = self._bus, self._dof
-        mode = self._supported_mode()
-        if mode is Mode.INTERPOLATED_POSITION:
+        *others, last = self._modes()
+        for mode in others:
+            try:
+                return self._enter(mode)
+            except (ModeRefusedError, SettingRefusedError):
+                continue
+        return self._enter(last)
+
+    def _enter(self, mode: Mode) -> Mode:
+        bus, dof, config = self._bus, self._dof, self._config
+        is_interpolated = mode is Mode.INTERPOLATED_POSITION
+        if is_interpolated:
             self._set(objects.INTERPOLATION_SUBMODE, 0)  # linear
+        if is_interpolated or config.interpolation_time:
             self._set(objects.INTERPOLATION_EXPONENT, -3)
-            self._set(objects.INTERPOLATION_TIME, round(self._config.cycle * 1e3), required=True)
+            self._set(objects.INTERPOLATION_TIME, round(config.cycle * 1e3), required=True)
+        if is_interpolated:
             for value in (0, 1):
                 self._clear_buffer(value)
-        bus.write(dof, objects.MODES_OF_OPERATION, mode)
-        deadline = time.monotonic() + self._config.state_timeout
+        self._write(objects.MODES_OF_OPERATION, mode)
+        deadline = time.monotonic() + config.state_timeout
         while (shown := bus.read(dof, objects.MODE_DISPLAY)) != mode:
+            if not shown and "6061" in config.waive:
+                break
             if time.monotonic() > deadline:
-                raise ModeRefusedError(
-                    bus.name(dof),
-                    f"it did not enter mode {mode.value}: mode display (0x6061) is {shown}",
-                    f"Disable it, and look up in its manual what mode {mode.value} requires",
-                )
-            time.sleep(self._config.cycle)
+                raise mode_refused(bus.name(dof), mode, shown)
+            time.sleep(config.cycle)
         return mode
 
     def read_or(self, entry: Entry, default: int) -> int:
@@ -121,16 +140,26 @@ class _DriveSetup:
         except AbsentError:
             return default
 
-    def _supported_mode(self) -> Mode:
-        supported = self._bus.read(self._dof, objects.SUPPORTED_MODES)
-        for mode in (Mode.CYCLIC_SYNCHRONOUS_POSITION, Mode.INTERPOLATED_POSITION):
+    def _modes(self) -> tuple[Mode, ...]:
+        """The mode to enter; both, in this order, if the drive does not tell and that is waived."""
+        name, config = self._bus.name(self._dof), self._config
+        try:
+            supported = self._bus.read(self._dof, objects.SUPPORTED_MODES)
+        except AbsentError as error:
+            require_waived(config, objects.SUPPORTED_MODES, error)
+            supported = 0
+        modes = (Mode.CYCLIC_SYNCHRONOUS_POSITION, Mode.INTERPOLATED_POSITION)
+        for mode in modes:
             if supported & mode.supported_bit:
-                return mode
+                return (mode,)
+        if "6502" in config.waive:
+            return modes
         raise ModeRefusedError(
-            self._bus.name(self._dof),
+            name,
             f"its supported modes (0x6502) are 0x{supported:08X}: neither cyclic synchronous "
             "position (8) nor interpolated position (7)",
-            "It cannot follow a stream of positions; use another drive or firmware",
+            f"It cannot follow a stream of positions. {waiver_hint('6502')}; else use another "
+            "drive or firmware",
         )
 
     def _clear_buffer(self, value: int) -> None:
@@ -141,22 +170,15 @@ class _DriveSetup:
             self.absent.append(str(objects.INTERPOLATION_BUFFER_CLEAR))
 
     def _set(self, entry: Entry, value: int, *, required: bool = False) -> None:
-        bus, dof = self._bus, self._dof
         try:
             self._write(entry, value)
-        except AbsentError:
-            index = f"{entry.index:04X}"
-            if required and index not in self._config.waive:
-                remedy = "The drive cannot be used"
-                if index in WAIVABLE:
-                    remedy = f"If another protection replaces it, add {index} to drives.waive"
-                raise SettingRefusedError(
-                    bus.name(dof), f"it does not have {entry}", remedy
-                ) from None
+            verify_setting(self._bus, self._dof, entry, value)
+        except SettingRefusedError as error:
+            if required or not isinstance(error, AbsentError):
+                require_waived(self._config, entry, error)
             self.absent.append(str(entry))
-            return
-        verify_setting(bus, dof, entry, value)
-        self.settings[str(entry)] = value
+        else:
+            self.settings[str(entry)] = value
 
     def _write(self, entry: Entry, value: int) -> None:
         try:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
+from tautscope.config.drives import waiver_hint
 from tautscope.dof import Dof
 from tautscope.errors import FollowingError, SilentDriveError
 from tautscope.hardware.drive_group import Feedback
@@ -152,6 +153,13 @@ class DriveMonitor:
         if has_exceeded or is_flagged:
             following = self._following
             note = " (the drive reports it too)" if is_flagged else ""
+            if not has_exceeded:
+                raise FollowingError(
+                    name,
+                    f"it reports a following error at {position:.6g}; recent commands are "
+                    f"{following.lower[dof]:.6g} to {following.upper[dof]:.6g}, within the limits",
+                    "Check its own limits. " + waiver_hint("6041.13"),
+                )
             raise FollowingError(
                 name,
                 f"following error: position {position:.6g}, recent commands "

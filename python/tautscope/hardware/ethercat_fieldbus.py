@@ -34,6 +34,7 @@ from tautscope.hardware.fieldbus import (
     Feedback,
     TxPdo,
     abort_error,
+    encoded,
     target_object,
     verify_setting,
 )
@@ -108,10 +109,11 @@ class EthercatFieldbus:
     def write(self, dof: Dof, entry: Entry, value: int) -> None:
         """Write a value by SDO download; see `Fieldbus.write`."""
         device = self._slaves[dof].device
+        data = encoded(self.name(dof), entry, value, entry.size)
         self._request(
             dof,
             f"{entry} = {value}",
-            lambda: device.sdo_write(entry.index, entry.subindex, entry.encode(value)),
+            lambda: device.sdo_write(entry.index, entry.subindex, data),
         )
 
     def configure(self, modes: Mapping[Dof, Mode]) -> None:

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+from tautscope.config import DrivesConfig
+from tautscope.config.drives import WAIVERS, waiver_hint
 from tautscope.dof import Dof
 from tautscope.errors import SettingRefusedError
 from tautscope.hardware import object_dictionary as objects
@@ -72,6 +74,36 @@ def abort_error(name: str, what: object, code: int, text: object) -> SettingRefu
         f"it refused {what}: abort code 0x{code:08X} ({text})",
         "Look up in its manual which values it accepts, and in which state",
     )
+
+
+def encoded(name: str, entry: Entry, value: int, size: int) -> bytes:
+    """A value as `size` little-endian bytes.
+
+    Raises:
+        SettingRefusedError: It does not fit.
+    """
+    try:
+        return value.to_bytes(size, "little", signed=entry.signed)
+    except OverflowError:
+        raise SettingRefusedError(
+            name,
+            f"{entry} cannot hold {value} in {size} bytes",
+            "Check counts_per_unit and speed_limit of this motor, and its EDS file if it has one",
+        ) from None
+
+
+def require_waived(config: DrivesConfig, entry: Entry, error: SettingRefusedError) -> None:
+    """Raise the error with its waiver as remedy, unless the object is waived.
+
+    Raises:
+        SettingRefusedError: The object is not waived.
+    """
+    waiver = next((name for name in WAIVERS if name == f"{entry.index:04X}"), None)
+    if waiver is None:
+        raise error
+    if waiver not in config.waive:
+        other = "" if isinstance(error, AbsentError) else f"{error.remedy}. "
+        raise type(error)(error.node, error.what, other + waiver_hint(waiver)) from None
 
 
 class Fieldbus(Protocol):

@@ -1,4 +1,4 @@
-"""Object dictionary entries of CiA 301 and CiA 402 that this package uses, and EDS files.
+"""Object dictionary entries of CiA 301 and CiA 402 that this package uses.
 
 The table replaces the EDS file of a drive where the configuration names none.
 """
@@ -6,10 +6,7 @@ The table replaces the EDS file of a drive where the configuration names none.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
-
-if TYPE_CHECKING:
-    import canopen
+from typing import Literal
 
 Access = Literal["ro", "rw", "const"]
 
@@ -129,75 +126,3 @@ def device_profile(node: int) -> tuple[Entry, ...]:
         for kind, number, base, mapping, cob in pdos
         for entry in pdo_entries(base, mapping, cob, f"{kind} {number + 1}")
     )
-
-
-def eds_text(node: int = 1) -> str:
-    """An EDS file (CiA 306) of `device_profile`."""
-    entries = sorted(device_profile(node), key=lambda entry: (entry.index, entry.subindex))
-    indices = sorted({entry.index for entry in entries})
-    mandatory = [index for index in indices if index in {0x1000, 0x1001, 0x1018}]
-    lines = ["[FileInfo]", "FileName=tautscope.eds", "EDSVersion=4.0", ""]
-    lines += ["[DeviceInfo]", "VendorName=tautscope", "ProductName=CiA 402 drive", ""]
-    for section, members in (
-        ("MandatoryObjects", mandatory),
-        ("OptionalObjects", [index for index in indices if index not in mandatory]),
-    ):
-        lines += [f"[{section}]", f"SupportedObjects={len(members)}"]
-        lines += [f"{number}=0x{index:04X}" for number, index in enumerate(members, 1)] + [""]
-    for index in indices:
-        members_of = [entry for entry in entries if entry.index == index]
-        if [entry.subindex for entry in members_of] == [0]:
-            lines += _section(f"{index:04X}", members_of[0])
-            continue
-        name = members_of[0].name.split(" COB-ID")[0]
-        lines += [f"[{index:04X}]", f"ParameterName={name}", "ObjectType=0x9"]
-        counted = [entry for entry in members_of if entry.subindex == 0]
-        lines += [f"SubNumber={len(members_of) + (not counted)}", ""]
-        if not counted:
-            largest = max(entry.subindex for entry in members_of)
-            count = Entry(index, 0, "Highest sub-index", 1, access="const", default=largest)
-            lines += _section(f"{index:04X}sub0", count)
-        for entry in members_of:
-            lines += _section(f"{index:04X}sub{entry.subindex:X}", entry)
-    return "\n".join(lines)
-
-
-def load_eds(path: str, node: int) -> canopen.ObjectDictionary:
-    """Read the object dictionary of an EDS file; without a path, that of `device_profile`.
-
-    Raises:
-        OSError: The file cannot be read.
-        ValueError: The file is not an EDS file of a CiA 402 drive; the message says why.
-    """
-    import configparser  # noqa: PLC0415 -- with canopen, only where a bus is opened
-    import warnings  # noqa: PLC0415
-    from io import StringIO  # noqa: PLC0415
-
-    from canopen.objectdictionary import import_od  # noqa: PLC0415
-
-    source: str | StringIO = path
-    if not path:
-        source = StringIO(eds_text(node))
-        source.name = "tautscope.eds"
-    try:
-        with warnings.catch_warnings():  # canopen calls a deprecated logging function
-            warnings.simplefilter("ignore", DeprecationWarning)
-            dictionary = import_od(source, node)
-    except (configparser.Error, KeyError, TypeError, AttributeError, NotImplementedError) as error:
-        raise ValueError(f"{type(error).__name__}: {error}") from None
-    if MODES_OF_OPERATION.index not in dictionary:
-        raise ValueError(f"it does not describe a CiA 402 drive: no {MODES_OF_OPERATION}")
-    return dictionary
-
-
-def _section(name: str, entry: Entry) -> list[str]:
-    return [
-        f"[{name}]",
-        f"ParameterName={entry.name}",
-        "ObjectType=0x7",
-        f"DataType=0x{entry.data_type:04X}",
-        f"AccessType={entry.access}",
-        f"DefaultValue={entry.default}",
-        f"PDOMapping={int(entry.mappable)}",
-        "",
-    ]

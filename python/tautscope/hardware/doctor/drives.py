@@ -134,10 +134,11 @@ def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
     found = f"mode {drive.mode}; {len(drive.settings)} settings read back correctly"
     data = {"mode": drive.mode, "settings": drive.settings, "absent": list(drive.absent)}
     what = f"{drive.name}: settings"
+    if config.waive:
+        found += f"; waived: {', '.join(config.waive)}"
     if drive.absent:
-        waived = f"; waived: {', '.join(config.waive)}" if config.waive else ""
         todo = "Make sure that other protections replace these objects"
-        found = f"{found}; it does not have {', '.join(drive.absent)}{waived}"
+        found = f"{found}; it does not have or take {', '.join(drive.absent)}"
         return CheckResult("drives", what, "note", found, todo, data)
     return CheckResult("drives", what, "ok", found, data=data)
 
