@@ -6,8 +6,8 @@
             applied = drives.exchange(command)  # once per drives.cycle, from one thread
 
 Their reaction to a lost connection, position and velocity limits are set and read back. `Drives`
-knows no protocol: CiA 402 drives, servos and microcontrollers are behind `DriveGroup`. Every failure raises a
-`DriveError` after the motors have been quick-stopped.
+knows no protocol: CiA 402 drives, servos and microcontrollers are behind `DriveGroup`. Every
+failure raises a `DriveError` after the motors have been quick-stopped.
 """
 
 from __future__ import annotations

@@ -12,7 +12,9 @@ from tautscope.config.microcontroller import MOST_AXES
 
 VERSION = 1
 LONGEST = 5 + 12 * MOST_AXES + 2 + 1
-"""Longest frame without its 0, the answer to a hello [byte]."""
+"""Longest answer, that to a hello, as a frame without its 0 [byte]."""
+LONGEST_REQUEST = 3 + 4 * MOST_AXES + 2 + 1
+"""Longest request, set-points, as a frame without its 0 [byte]."""
 _ANSWER = 0x80
 
 
@@ -121,6 +123,11 @@ def request(kind: int, number: int, body: bytes = b"") -> bytes:
 def setpoints(targets: Sequence[int]) -> bytes:
     """The body of set-points [counts]."""
     return struct.pack(f"<{len(targets)}i", *targets)
+
+
+def read_setpoints(body: bytes) -> tuple[int, ...]:
+    """The targets [counts] in the body of set-points."""
+    return struct.unpack(f"<{len(body) // 4}i", body)
 
 
 def number_of(message: bytes) -> int:

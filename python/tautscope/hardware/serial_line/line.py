@@ -104,7 +104,7 @@ class SerialLine:
         return self._number
 
     def receive(self, number: int, timeout: float) -> list[bytes]:
-        """Wait for the answer to a request; all intact answers up to then, or to the timeout [s]."""
+        """Wait for the answer to a request; all intact messages until then or the timeout [s]."""
         deadline, answers = time.monotonic() + timeout, list[bytes]()
         while not (answers and frames.number_of(answers[-1]) == number):
             if time.monotonic() >= deadline:

@@ -1,7 +1,7 @@
 """Three motors behind a microcontroller: a `tautscope.hardware.drive_group.DriveGroup`.
 
-Each cycle is one request with the set-points of all axes, which is answered at once by all positions
-and the state. The microcontroller stops the motors by itself if no set-points come for
+Each cycle is one request with the set-points of all axes, which is answered at once by all
+positions and the state. The microcontroller stops the motors by itself if no set-points come for
 `heartbeat_timeout` (docs/serial.md).
 """
 
@@ -218,9 +218,7 @@ class SerialDrives:
             )
         return self._axes[self._config[dof].node - 1]
 
-    def _ask(
-        self, kind: Request, body: bytes = b"", timeout: float | None = None
-    ) -> frames.Status:
+    def _ask(self, kind: Request, body: bytes = b"", timeout: float | None = None) -> frames.Status:
         """Repeat a request until it is answered."""
         deadline = time.monotonic() + (timeout or self._config.request_timeout)
         while (now := time.monotonic()) < deadline:
