@@ -55,7 +55,7 @@ typedef struct {
     void (*enable)(bool on);                          /* current on at the present position, or off */
     void (*stop)(void);                               /* stop all motors now, and hold them */
     void (*write)(const uint8_t *data, uint8_t size);
-    uint32_t (*millis)(void);
+    uint32_t (*millis)(void); /* what it is wrong by, as 2 ms of Arduino's millis(), is added to the watchdog time */
 } tautscope_board;
 
 typedef struct {

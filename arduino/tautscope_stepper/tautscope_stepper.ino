@@ -19,11 +19,17 @@ struct Motor {
 };
 volatile Motor motors[AXES];
 volatile uint16_t ticks;  // since the last set-points
+volatile uint32_t milliseconds;
 
 // Move each motor by at most one step. Steps are spread over the time between two set-points.
 ISR(TIMER1_COMPA_vect) {
   PORTD &= ~STEP_BITS;  // ends the pulses of the tick before
   if (ticks < 0xFFFF) ticks++;
+  static uint8_t part;
+  if (++part == TICK_RATE / 1000) {
+    part = 0;
+    milliseconds++;
+  }
   for (uint8_t i = 0; i < AXES; i++) {
     volatile Motor &motor = motors[i];
     if (motor.left == 0) continue;
@@ -60,7 +66,7 @@ void set_target(uint8_t axis, int32_t counts) {
   motors[axis].left = left;
   motors[axis].rate = rate;
   motors[axis].is_forward = distance > 0;
-  digitalWrite(DIRECTION_PIN + axis, distance > 0);  // a tick or more before the next step
+  digitalWrite(DIRECTION_PIN + axis, distance > 0);
   interrupts();
 }
 
@@ -79,7 +85,12 @@ uint8_t fault(uint8_t) { return TAUTSCOPE_NO_FAULT; }  // these drivers report n
 
 void send(const uint8_t *data, uint8_t size) { Serial.write(data, size); }
 
-uint32_t now() { return millis(); }
+uint32_t now() {
+  noInterrupts();
+  uint32_t at = milliseconds;
+  interrupts();
+  return at;
+}
 
 const tautscope_board board = {
     AXES,

@@ -50,7 +50,7 @@ class SerialBoard:
         is_silent = self.state == State.ENABLED and now - self.heard_at >= self.watchdog
         if is_silent or any(self.faults):
             self._stop()
-            self.state = State.SILENCE if is_silent else State.FAULT
+            self.state = State.FAULT if any(self.faults) else State.SILENCE
 
     def _serve(self, kind: int, body: bytes, now: int) -> Refusal:
         sizes = {Request.ENABLE: 2, Request.SETPOINTS: 4 * len(self.axes)}
