@@ -119,6 +119,11 @@ def test_lost_answers_are_counted_and_the_motion_goes_on(tmp_path: Path) -> None
         until(lambda: drives.exchange(drives.last_command) is not None and min(late) > 3)
         board.clear(Dof.INSERTION)
         drive(drives, 10)
+        before = late[0]
+        board.inject("delay", Dof.INSERTION, 1.5 * drives.cycle)  # answers to earlier set-points
+        for _ in range(20):
+            drives.exchange(drives.last_command)
+        assert late[0] >= before + 20
         assert 3 < max(drives.statistics.lost) <= min(late)  # an answer is that of all motors
 
 
