@@ -39,6 +39,7 @@ CONTROLS = {
     "D1": [
         "python/tautscope/hardware/cia402_drives.py",
         "python/tautscope/hardware/servos/servo_drives.py",
+        "python/tautscope/hardware/serial_line/serial_drives.py",
     ],
     "D2": ["python/tautscope/hardware/canopen_master.py"],
     "D3": ["python/tautscope/hardware/following_error.py"],
@@ -95,6 +96,7 @@ PURPOSE = {
     "av": "camera sources and video files",
     "canopen": "SDO transfers and EDS files of drives",
     "python-can": "CAN frames: set-points, heartbeats, quick stop",
+    "pyserial": "serial line to a microcontroller",
     "pysoem": "EtherCAT master",
     "rustypot": "packets of Dynamixel and Feetech servos",
     "dask": "benchmarks on a cluster",

@@ -12,7 +12,7 @@ MODULES = {
     "twin": ("cv2", "matplotlib", "mcap", "mujoco", "rich"),
     "console": ("cv2", "mcap", "websockets"),
     "ros2": ("cv2", "mcap", "rosbags", "zenoh"),
-    "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),
+    "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich", "serial"),
     "ethercat": ("pysoem",),
     "servo": ("rustypot",),
     "cluster": ("dask", "distributed"),

@@ -110,7 +110,7 @@ def test_documented_configurations_are_valid() -> None:
     assert of_can is not None
     # 4096 counts per turn, gear ratio 20:1, divided by 2 pi.
     assert of_can.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)
-    assert [one.protocol for one in of_servos if one] == ["dynamixel", "feetech"]
+    assert [one.protocol for one in of_servos if one] == ["dynamixel", "feetech", "serial"]
     for block, drives in zip(blocks[1:], of_servos, strict=True):
         assert len(block.splitlines()) <= 15
         assert drives is not None
@@ -141,7 +141,7 @@ def test_servos_have_defaults_in_units_of_the_dof() -> None:
     [
         ({"rotation": {"node": 2, "travel": [0, 1]}}, "drives.rotation.model", "one of STS3215"),
         ({"rotation": SERVO["rotation"] | {"model": "XL330-M288"}}, "drives.rotation.model", "STS"),  # type: ignore[operator]
-        ({"rotation": SERVO["rotation"] | {"eds": "x"}}, "drives.rotation.eds", "servos do not"),  # type: ignore[operator]
+        ({"rotation": SERVO["rotation"] | {"eds": "x"}}, "drives.rotation.eds", "CiA 402"),  # type: ignore[operator]
         (
             {"rotation": SERVO["rotation"] | {"torque_limit": 1.5}},
             "drives.rotation.torque_limit",
@@ -152,8 +152,8 @@ def test_servos_have_defaults_in_units_of_the_dof() -> None:
             "drives.insertion.counts_per_unit",
             "no default",
         ),
-        ({"interface": "slcan"}, "drives.interface", "servos do not use it"),
-        ({"waive": ["6007"]}, "drives.waive", "servos do not use it"),
+        ({"interface": "slcan"}, "drives.interface", "CiA 402"),
+        ({"waive": ["6007"]}, "drives.waive", "CiA 402"),
     ],
 )
 def test_error_names_the_invalid_field_of_servos(

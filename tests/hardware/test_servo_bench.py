@@ -1,4 +1,4 @@
-"""The bench with servos: the twin behind a pseudo-terminal, in a process of its own."""
+"""The bench on a serial line: the twin behind a pseudo-terminal, in a process of its own."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ from test_bench import RUN
 from test_processes import Lines, process
 from waiting import TIMEOUT, until
 
-FAMILIES = pytest.mark.parametrize("protocol", sorted(MODELS))
+PROTOCOLS = pytest.mark.parametrize("protocol", [*sorted(MODELS), "serial"])
+ENABLED = {"serial": "enabled"}
+"""Event of an enabled motor where it is not "torque on"."""
+FAULT = {"serial": ("fault: driver", "rotation, axis 2: it reports a fault: driver")}
 CYCLE = TIMES["cycle"]
 
 
@@ -69,12 +72,12 @@ def running_bench(config: Config, folder: Path) -> Iterator[tuple[Path, Any, Lin
         yield file, bench, lines
 
 
-@FAMILIES
+@PROTOCOLS
 def test_a_protocol_runs_on_servos(protocol: str, tmp_path: Path) -> None:
     config = bench_config(protocol, tmp_path)
     with running_bench(config, tmp_path) as (_, _, lines):
         found = run_on_hardware(config, tmp_path / "run", lambda share: None)
-        lines.until("torque on", 3)
+        lines.until(ENABLED.get(protocol, "torque on"), 3)
     trace = found.compensated.recording.trace
     assert len(trace) == round(3 * 3 * 1.0 / CYCLE)
     # The motors did what the commands were, in distance if not in time.
@@ -83,11 +86,13 @@ def test_a_protocol_runs_on_servos(protocol: str, tmp_path: Path) -> None:
     assert (abs(moved - commanded) <= 0.1 * commanded + resolution).all()
 
 
-@FAMILIES
+@PROTOCOLS
 def test_doctor_jog_and_a_fault_by_name(
     protocol: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = bench_config(protocol, tmp_path)
+    servo = ("fault: overload", "rotation, servo 2: it reports a fault: overload")
+    event, message = FAULT.get(protocol, servo)
     with running_bench(config, tmp_path) as (file, bench, lines):
         main(["doctor", "--config", str(file), "--json"])
         drives = [
@@ -105,19 +110,20 @@ def test_doctor_jog_and_a_fault_by_name(
             running,
             _,
         ):
-            lines.until("torque on", 3)
+            lines.until(ENABLED.get(protocol, "torque on"), 3)
             bench.stdin.write("fault rotation\n")
             bench.stdin.flush()
-            lines.until("fault: overload")
+            lines.until(event)
             assert running.wait(TIMEOUT) in (3, 4)  # before or after the loop began
-            assert "rotation, servo 2: it reports a fault: overload" in running.stderr.read()
+            assert message in running.stderr.read()
 
 
-def test_the_console_enables_and_stops_servos(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("protocol", ["dynamixel", "serial"])
+def test_the_console_enables_and_stops_motors(
+    protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tautscope.console.operator_input.COMMAND_TIMEOUT", TIMEOUT)
-    config = bench_config("dynamixel", tmp_path)
+    config = bench_config(protocol, tmp_path)
     with running_bench(config, tmp_path) as (_, _, lines), ThreadPoolExecutor(1) as executor:
         control = RigControl(config, HardwareRig(config), tmp_path / "console", executor)
         control.lease.take(1)
@@ -126,7 +132,7 @@ def test_the_console_enables_and_stops_servos(
         control.operator.receive(Received(1, now, servo), now)
         try:
             control.open()
-            lines.until("torque on", 3)
+            lines.until(ENABLED.get(protocol, "torque on"), 3)
             assert control.run is not None, control.fault
             for _ in range(3):
                 control.run.tick()

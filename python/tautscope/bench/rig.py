@@ -2,7 +2,7 @@
 
     with Bench(config) as bench: bench.request("freeze rotation")
 
-Another process drives it through a CAN bus or a serial line of servos, and a socket of images.
+Another process drives it through a CAN bus or a serial line, and a socket of images.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import Event
 from tautscope.bench.ground_truth import GroundTruthWriter
+from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import Config
-from tautscope.config.servos import PORTS
+from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.rig import require_drives
@@ -33,14 +34,15 @@ CAMERA = "camera"
 
 
 class Bench:
-    """Three simulated drives or servos that move the twin's plant, and the twin's camera.
+    """Three simulated motors on a bus or line that move the twin's plant, and the twin's camera.
 
     A ``twin.seed`` gives the same instrument as in `tautscope.twin.Twin`. The plant advances by one
-    ``control.period`` with every SYNC; servos also advance it when nobody commands them.
+    ``control.period`` with every SYNC; motors on a serial line also advance it when nobody commands
+    them.
 
     Args:
         config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) name the sockets, or
-            the link to the servos' pseudo-terminal.
+            the link to the pseudo-terminal of servos or microcontroller.
         truth: CSV file for the true tip state at every step of the plant, for evaluation only.
         modes: Supported modes of operation of CiA 402 drives.
 
@@ -53,10 +55,10 @@ class Bench:
         self, config: Config, truth: Path | None = None, *, modes: tuple[int, ...] = (7, 8)
     ) -> None:
         drives = require_drives(config)
-        is_servo = drives.protocol in PORTS
-        if not is_servo and drives.interface != "tautscope":
+        is_on_line = drives.protocol in SERIAL_PORTS
+        if not is_on_line and drives.interface != "tautscope":
             raise ConfigError("drives.interface", drives.interface, "tautscope, on the bench")
-        if is_servo and drives.channel.startswith("/dev/"):
+        if is_on_line and drives.channel.startswith("/dev/"):
             raise ConfigError("drives.channel", drives.channel, "no device, on the bench")
         url = config.camera.source.url
         if not url.startswith("unix:"):
@@ -76,8 +78,10 @@ class Bench:
             if truth is not None:
                 self._truth = self._resources.enter_context(GroundTruthWriter(truth))
             start = self._plant.applied
-            self.drives: SimulatedDrives | SimulatedServos
-            if is_servo:
+            self.drives: SimulatedDrives | SimulatedServos | SimulatedMicrocontroller
+            if drives.protocol == PROTOCOL:
+                self.drives = SimulatedMicrocontroller(drives, self._on_sync, start=start)
+            elif is_on_line:
                 self.drives = SimulatedServos(drives, self._on_sync, start=start)
             else:
                 bus = self._open_bus(drives.channel)

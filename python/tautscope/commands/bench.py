@@ -26,12 +26,12 @@ def add_parser(verbs: arguments.Verbs) -> None:
         _bench,
         help="run a simulated rig: drives and a camera for `tautscope run`",
         description="Run a simulated rig for another process: the simulated instrument behind "
-        "three CiA 402 drives on a CAN bus, or servos on a serial line (--config bench_dynamixel, "
-        "bench_feetech), and a camera stream, in real time. Ends with its input, "
-        "Ctrl-C or SIGTERM; in the background, where it has no input, with a signal only. "
-        "A line of input injects a fault: KIND PART, with the part insertion, rotation, "
-        "bending (drop, delay, fault, freeze; drives also heartbeat, refuse; servos also restart) "
-        "or camera (drop, delay, fault: "
+        "three CiA 402 drives on a CAN bus, or servos or a microcontroller on a serial line "
+        "(--config bench_dynamixel, bench_feetech, bench_serial), and a camera stream, in real "
+        "time. Ends with its input, Ctrl-C or SIGTERM; in the background, where it has no input, "
+        "with a signal only. A line of input injects a fault: KIND PART, with the part insertion, "
+        "rotation, bending (drop, delay, fault, freeze; drives also heartbeat, refuse; on a serial "
+        "line also restart) or camera (drop, delay, fault: "
         "unplugged, freeze, board: a calibration board is shown); clear PART ends it. Events are "
         "written as JSON lines.",
         extras=["hardware", "twin"],
@@ -117,6 +117,10 @@ def _bench(options: argparse.Namespace) -> None:
             printer.close()
 
 
+_ENABLED = ("operation enabled", "torque on", "enabled")
+"""Events of enabled motors: of CiA 402, servos, a microcontroller."""
+
+
 def _inject_faults(
     bench: Bench, faults: list[tuple[float, str]], stopping: threading.Event
 ) -> None:
@@ -124,7 +128,7 @@ def _inject_faults(
     enabled_at: float | None = None
     while faults and not stopping.wait(0.01):
         if enabled_at is None:
-            enabled = [e.time for e in bench.events if e.what in ("operation enabled", "torque on")]
+            enabled = [e.time for e in bench.events if e.what in _ENABLED]
             enabled_at = enabled[0] if enabled else None
         elif time.monotonic() >= enabled_at + faults[0][0]:
             bench.request(faults.pop(0)[1])

@@ -21,6 +21,7 @@ from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.microcontroller import MOST_AXES, PROTOCOL, SERIAL_PORTS
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import default_of, relation
 from tautscope.config.servos import PORTS, models_of
@@ -193,7 +194,7 @@ _OF_CIA_402 = (
     "interpolation_time",
     "waive",
 )
-"""Keys of [drives] that servos do not use."""
+"""Keys of [drives] that only CiA 402 drives use."""
 _OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
 """Keys of a motor that only servos use."""
 
@@ -219,20 +220,24 @@ def _check_drives(drives: DrivesConfig) -> None:
             allowed = "one of " + ", ".join(models_of(drives.protocol))
             known = axis.model in models_of(drives.protocol)
             _require(known, f"{path}.model", axis.model, allowed)
-            _require_defaults(axis, path, ("eds",), "servos do not use it")
             lower, upper = axis.stops or (-math.inf, math.inf)
             inside = lower <= axis.travel[0] and axis.travel[1] <= upper
             _require(inside, f"{path}.travel", axis.travel, f"within stops = {axis.stops}")
         else:
             _require_defaults(axis, path, _OF_SERVOS, "only servos use it")
+        if drives.protocol in SERIAL_PORTS:
+            _require_defaults(axis, path, ("eds",), "only CiA 402 drives use it")
+        if drives.protocol == PROTOCOL:
+            allowed = f"an axis of the microcontroller, 1 to {MOST_AXES}"
+            _require(axis.node <= MOST_AXES, f"{path}.node", axis.node, allowed)
         _require(
             axis.speed_limit * drives.cycle * axis.counts_per_unit >= 1,
             f"{path}.counts_per_unit",
             axis.counts_per_unit,
             "at least one count per cycle at the speed limit; per m or rad, not mm or deg",
         )
-    if drives.protocol in PORTS:
-        _require_defaults(drives, "", _OF_CIA_402, "servos do not use it")
+    if drives.protocol in SERIAL_PORTS:
+        _require_defaults(drives, "", _OF_CIA_402, "only CiA 402 drives use it")
     else:
         _require(drives.bitrate <= 1_000_000, "bitrate", drives.bitrate, "at most 1000000 on CAN")
     for name, most in (

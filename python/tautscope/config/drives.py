@@ -41,11 +41,13 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """One motor and its drive.
 
     Values without a default depend on the rig. A servo needs only `node`, `model`, `travel`, and
-    for insertion `counts_per_unit`.
+    for insertion `counts_per_unit`; a motor behind a microcontroller `node`, `counts_per_unit`,
+    `travel` and `speed_limit`.
     """
 
     node: Annotated[int, Meta(ge=1, le=127)]
-    """CANopen node id; with EtherCAT, the position on the line, counted from 1; id of a servo."""
+    """CANopen node id; with EtherCAT, the position on the line, counted from 1; id of a servo; axis
+    of a microcontroller, counted from 1."""
     counts_per_unit: Positive
     """Encoder counts per m or rad of the instrument's DOF, including gears. A servo has 4096 per
     turn of its horn; without gears these are 651.9 per rad, the default of servos."""
@@ -56,7 +58,8 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     speed_limit: Positive
     """Largest speed [m/s or rad/s]; set in the drive and checked for every command."""
     following_error: Positive
-    """Largest distance of the motor from all commands of the last `lag` [m or rad]."""
+    """Largest distance of the motor from all commands of the last `lag` [m or rad]; behind a
+    microcontroller, by default 1 % of the width of `travel`."""
     following_window: Positive
     """Largest distance that may last longer than `following_timeout` [m or rad]; at most
     `following_error`."""
@@ -85,16 +88,17 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     insertion: AxisConfig
     rotation: AxisConfig
     bending: AxisConfig
-    protocol: Literal["canopen", "ethercat", "dynamixel", "feetech"] = "canopen"
-    """Protocol of the bus: CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos (protocol 2.0)
-    or Feetech STS servos."""
+    protocol: Literal["canopen", "ethercat", "dynamixel", "feetech", "serial"] = "canopen"
+    """Protocol of the bus: CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos (protocol
+    2.0), Feetech STS servos, or motors behind a microcontroller on a serial line."""
     interface: str = "socketcan"
     """Name of a python-can interface that does not receive its own frames."""
     channel: str = "can0"
-    """Channel of the interface; with EtherCAT, the network adapter; of servos, the serial port, by
-    default /dev/ttyUSB0 (Dynamixel) or /dev/ttyACM0 (Feetech)."""
+    """Channel of the interface; with EtherCAT, the network adapter; else the serial port, by
+    default /dev/ttyUSB0 (Dynamixel) or /dev/ttyACM0 (Feetech, microcontroller)."""
     bitrate: Annotated[int, Meta(ge=9_600, le=4_000_000)] = 1_000_000
-    """[bit/s]; SocketCAN uses the setting of the operating system."""
+    """[bit/s]; SocketCAN uses the setting of the operating system. Of a microcontroller, by default
+    250000."""
     options: dict[str, str | int | float | bool] = field(default_factory=dict)
     """Further options of the interface."""
     cycle: Positive = 0.01
@@ -111,14 +115,14 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     heartbeat_timeout: Positive = 0.08
     """Time without a heartbeat after which a drive quick-stops, and the master stops all drives
     [s], whole milliseconds. Of servos, time without an answer or a set-point, and the bus watchdog
-    of Dynamixel, rounded up to 20 ms."""
+    of Dynamixel, rounded up to 20 ms. Of a microcontroller, its watchdog time."""
     state_timeout: Positive = 1.0
     """Timeout of each state transition [s]."""
     request_timeout: Positive = 0.3
     """Timeout of each SDO response, or answer of a servo to a setting [s]."""
     lag: Positive = 0.02
     """Largest delay of the motors [s]: filters and servo loops of the drives, late set-points; by
-    default 0.06 of servos."""
+    default 0.06 of servos and microcontrollers."""
     following_timeout: Positive = 0.05
     """How long the following error may exceed `following_window` [s], whole milliseconds."""
     command_timeout: Positive = 0.5

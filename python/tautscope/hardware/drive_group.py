@@ -38,6 +38,18 @@ class Feedback(Protocol):
         ...
 
 
+@dataclass(slots=True)
+class NewestAnswer:
+    """The newest answer of a motor on a serial line: a `Feedback`."""
+
+    position: int = 0
+    age: int = 0
+    answers: int = 0
+    silence: float = 0.0
+    reports_following_error: bool = False
+    answered_at: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class CommissionedDrive:
     """A drive's identity and settings.
@@ -45,7 +57,7 @@ class CommissionedDrive:
     Attributes:
         name: Its name for messages.
         vendor, product: Numbers in its identity; 0 where they are missing.
-        mode: The mode of operation it entered.
+        mode: The mode of operation it entered; 0 is not shown.
         settings: Setting and value as read back.
         absent: Settings that the drive lacks.
     """

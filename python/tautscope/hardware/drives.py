@@ -6,8 +6,8 @@
             applied = drives.exchange(command)  # once per drives.cycle, from one thread
 
 Their reaction to a lost connection, position and velocity limits are set and read back. `Drives`
-knows no protocol: CiA 402 drives and servos are behind `DriveGroup`. Every failure raises a
-`DriveError` after the motors have been quick-stopped.
+knows no protocol: CiA 402 drives, servos and microcontrollers are behind `DriveGroup`. Every
+failure raises a `DriveError` after the motors have been quick-stopped.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
+from tautscope.config.microcontroller import PROTOCOL
 from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, SignalError, StateError
@@ -63,6 +64,11 @@ def open_group(config: DrivesConfig) -> DriveGroup:
         from tautscope.hardware.servos.servo_drives import ServoDrives  # noqa: PLC0415
 
         return ServoDrives(config)
+    if config.protocol == PROTOCOL:
+        from tautscope.hardware.serial_line.line import open_port  # noqa: PLC0415
+        from tautscope.hardware.serial_line.serial_drives import SerialDrives  # noqa: PLC0415
+
+        return SerialDrives(config, open_port(config))
     require_extras("CANopen", ["hardware"])
     from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
 

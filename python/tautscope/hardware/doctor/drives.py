@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from tautscope.config import DrivesConfig
-from tautscope.config.servos import PORTS
+from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
@@ -92,9 +92,9 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
 
 
 def _check_latency(config: DrivesConfig) -> list[CheckResult]:
-    """Check how long the driver of a serial adapter (FTDI) keeps answers of servos back."""
+    """Check how long the driver of a serial adapter (FTDI) keeps answers back."""
     timer = SERIAL_DRIVERS / Path(config.channel).resolve().name / "latency_timer"
-    if config.protocol not in PORTS or not timer.is_file():
+    if config.protocol not in SERIAL_PORTS or not timer.is_file():
         return []
     found = int(timer.read_text(encoding="ascii"))
     what = f"latency of {config.channel}"
@@ -131,7 +131,8 @@ def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Dof) -> CheckResu
 
 
 def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
-    found = f"mode {drive.mode}; {len(drive.settings)} settings read back correctly"
+    mode = f"mode {drive.mode}; " if drive.mode else ""
+    found = f"{mode}{len(drive.settings)} settings read back correctly"
     data = {"mode": drive.mode, "settings": drive.settings, "absent": list(drive.absent)}
     what = f"{drive.name}: settings"
     if config.waive:
@@ -156,7 +157,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
         answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
     silent = [group.name(dof) for dof in Dof if not answers[dof]]
-    what = "answers" if config.protocol in PORTS else "heartbeats and answers"
+    what = "answers" if config.protocol in SERIAL_PORTS else "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:
         found = f"no answer to any of {len(times)} set-points from {', '.join(silent)}"
@@ -164,7 +165,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
         return CheckResult("drives", what, "missing", found, todo, data)
     every = f"both ways every {1e3 * config.heartbeat_period:.0f} ms; "
     found = (
-        f"{'' if config.protocol in PORTS else every}{len(times)} set-points, "
+        f"{'' if config.protocol in SERIAL_PORTS else every}{len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
         f"{late} of {3 * len(times)} late"
     )

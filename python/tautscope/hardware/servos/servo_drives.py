@@ -9,30 +9,17 @@ families only Dynamixel stops by itself when packets are missing (bus watchdog,
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, EmergencyError, StateError
-from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
+from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus, NewestAnswer
 from tautscope.hardware.servos.families import FAMILIES, Register
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
 from tautscope.hardware.servos.servo import Servo
 
 _WATCHDOG_UNIT = 0.02
 """Unit of the bus watchdog [s]."""
-
-
-@dataclass(slots=True)
-class ServoFeedback:
-    """The newest answer of a servo; see `tautscope.hardware.drive_group.Feedback`."""
-
-    position: int = 0
-    age: int = 0
-    answers: int = 0
-    silence: float = 0.0
-    reports_following_error: bool = False
-    answered_at: float = 0.0
 
 
 class ServoDrives:
@@ -54,7 +41,7 @@ class ServoDrives:
         self._line = ServoLine(config, family)
         self._servos = [Servo(config, dof, self._line) for dof in Dof]
         self._ids = [servo.id for servo in self._servos]
-        self._feedback = [ServoFeedback() for _ in Dof]
+        self._feedback = [NewestAnswer() for _ in Dof]
         self._goals = [0, 0, 0]
         self._sent_at = 0.0
         self._has_lost_answers = self._is_moving = self._was_enabled = False
@@ -90,12 +77,12 @@ class ServoDrives:
         for one, position in zip(self._feedback, positions, strict=True):
             one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, now
 
-    def probe(self) -> list[ServoFeedback]:
+    def probe(self) -> list[NewestAnswer]:
         """Read all servos once."""
         self._receive()
         return self._feedback
 
-    def enable(self, *, reset_faults: bool) -> list[ServoFeedback]:
+    def enable(self, *, reset_faults: bool) -> list[NewestAnswer]:
         """See `DriveGroup.enable`."""
         family = self._family
         self._line.set_timeout(self._config.request_timeout)
@@ -119,7 +106,7 @@ class ServoDrives:
         self.start(self._goals)
         return self.exchange(self._goals)
 
-    def exchange(self, targets: list[int]) -> list[ServoFeedback]:
+    def exchange(self, targets: list[int]) -> list[NewestAnswer]:
         """Send the set-points, read the positions.
 
         Raises:

@@ -1,0 +1,154 @@
+"""Three simulated motors behind a pseudo-terminal, which a client opens as a serial port.
+
+The motors move by themselves, as long as they have power: after each cycle of a client, and by the
+clock when no client cycles.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import heapq
+import itertools
+import math
+import os
+import select
+import time
+import tty
+from abc import abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.bench.motors import Kind, SimulatedMotors
+from tautscope.config import DrivesConfig
+from tautscope.errors import ConfigError
+
+OnCycle = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""The plant: demanded positions (3,) [m, rad, rad] to positions; called once per period."""
+_IDLE = 0.005
+"""How often the line is looked at while no client has it open [s]."""
+
+
+class LineMotors(SimulatedMotors[Kind]):
+    """Three motors on one line.
+
+    Args:
+        config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
+        kinds: The faults that they know.
+        on_cycle: The plant; without it, the motors follow ideally.
+
+    Raises:
+        ConfigError: The link cannot be made.
+    """
+
+    def __init__(
+        self, config: DrivesConfig, kinds: tuple[Kind, ...], on_cycle: OnCycle | None
+    ) -> None:
+        super().__init__(kinds)
+        self._config = config
+        self._on_cycle = on_cycle
+        self._has_goals = False
+        self._buffer = bytearray()
+        self._answers: list[tuple[float, int, bytes]] = []
+        self._order = itertools.count()
+        self._stepped_at = 0.0
+        self._link = Path(config.channel)
+        self._line = self._open()
+
+    def __exit__(self, *failure: object) -> None:
+        try:
+            super().__exit__(*failure)
+        finally:
+            self._link.unlink(missing_ok=True)
+            os.close(self._line)
+            os.close(self._lock)
+
+    @abstractmethod
+    def _process(self, now: float) -> None:
+        """Take what is complete in `_buffer`, and `_queue` the answers.
+
+        A cycle of the client sets `_has_goals`.
+        """
+
+    @abstractmethod
+    def _advance(self, period: float, now: float) -> list[float]:
+        """Advance the position loops by a period [s]; the demanded positions [m, rad, rad]."""
+
+    @abstractmethod
+    def _move(self, positions: NDArray[np.float64]) -> None:
+        """Take note of the positions that the plant has reached (3,) [m, rad, rad]."""
+
+    def _due(self) -> float:
+        """When something must happen without a byte from the client [s]."""
+        return math.inf
+
+    def _queue(self, at: float, data: bytes) -> None:
+        """Send data at a time [s]."""
+        heapq.heappush(self._answers, (at, next(self._order), data))
+
+    def _wire_time(self, size: int) -> float:
+        """How long so many bytes take on the line [s]."""
+        return 10 * size / self._config.bitrate
+
+    def _open(self) -> int:
+        line, end = os.openpty()
+        try:
+            tty.setraw(end)
+            # The lock ends with the process; a link of one that was killed stays.
+            self._lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if self._link.is_symlink():
+                self._link.unlink()
+            self._link.symlink_to(os.ttyname(end))
+        except OSError as error:
+            os.close(line)
+            allowed = f"a link that can be made ({error}); is another bench running?"
+            raise ConfigError("drives.channel", str(self._link), allowed) from None
+        finally:
+            os.close(end)  # so that a client's exclusive lock ends with the client
+        os.set_blocking(line, False)
+        return line
+
+    def _begin(self) -> None:
+        self._stepped_at = time.monotonic()
+
+    def _process_next(self) -> None:
+        due = min(self._stepped_at + 1.5 * self._config.cycle, self._due())
+        if self._answers:
+            due = min(due, self._answers[0][0])
+        self._receive(max(0.0, due - time.monotonic()))
+        now = time.monotonic()
+        self._apply_requests(now)
+        self._process(now)
+        while self._answers and self._answers[0][0] <= time.monotonic():
+            self._send(heapq.heappop(self._answers)[2])
+        has_cycled = self._has_goals and not self._answers
+        if has_cycled or now >= self._stepped_at + 1.5 * self._config.cycle:
+            self._step(now, has_cycled=has_cycled)
+
+    def _receive(self, timeout: float) -> None:
+        readable, _, _ = select.select([self._line], [], [], timeout)
+        if not readable:
+            return
+        try:
+            self._buffer += os.read(self._line, 4096)
+        except OSError:  # no client has the other end open
+            self._buffer.clear()
+            time.sleep(_IDLE)
+
+    def _send(self, data: bytes) -> None:
+        try:
+            os.write(self._line, data)
+        except OSError:
+            return  # the client is gone
+
+    def _step(self, now: float, *, has_cycled: bool) -> None:
+        # Without a client's cycles the clock counts, and a late step does not move the grid.
+        self._stepped_at = now if has_cycled else self._stepped_at + self._config.cycle
+        if now - self._stepped_at > 1.0:
+            self._stepped_at = now
+        self._has_goals = False
+        demand = np.array(self._advance(self._config.cycle, now))
+        self._move(demand if self._on_cycle is None else self._on_cycle(demand))

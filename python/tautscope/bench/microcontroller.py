@@ -1,0 +1,121 @@
+"""A simulated microcontroller with three motors behind a pseudo-terminal, with fault injection.
+
+with SimulatedMicrocontroller(config, plant): ...  # a client opens drives.channel
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.bench.line_motors import LineMotors, OnCycle
+from tautscope.bench.serial_board import SerialBoard
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.hardware.scale import Scale
+from tautscope.hardware.serial_line import frames
+from tautscope.hardware.serial_line.frames import FAULTS, Limits, Request, State
+
+FaultKind = Literal["drop", "delay", "fault", "freeze", "restart"]
+"""drop: the microcontroller neither sends nor receives. delay: it answers late. fault: a motor's
+driver reports one. freeze: a motor is blocked. restart: the microcontroller restarts."""
+_LIMIT = 1 << 30
+_DRIVER = 1
+
+
+class SimulatedMicrocontroller(LineMotors[FaultKind]):
+    """Motors with encoders that count from where they are when it starts.
+
+    Args:
+        config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
+        on_cycle: The plant; without it, the motors follow ideally.
+        start: (3,) positions at the start [m, rad, rad].
+
+    Raises:
+        ConfigError: The link cannot be made.
+    """
+
+    def __init__(
+        self,
+        config: DrivesConfig,
+        on_cycle: OnCycle | None = None,
+        *,
+        start: NDArray[np.float64] | None = None,
+    ) -> None:
+        super().__init__(config, get_args(FaultKind), on_cycle)
+        self._scales = [Scale(config[dof], dof.label) for dof in Dof]
+        self._at = [config[dof].node - 1 for dof in Dof]
+        shafts = np.zeros(3) if start is None else start
+        self.shafts = [
+            scale.to_counts(float(shaft)) for scale, shaft in zip(self._scales, shafts, strict=True)
+        ]
+        """Where the motors are [counts from home]."""
+        self._zeros = [0, 0, 0]
+        self._demands = [0.0, 0.0, 0.0]
+        self._blocked: set[Dof] = set()
+        speeds = {
+            at: scale.speed_counts() for at, scale in zip(self._at, self._scales, strict=True)
+        }
+        self._limits = [
+            Limits(-_LIMIT, _LIMIT, speeds.get(at, 0)) for at in range(max(self._at) + 1)
+        ]
+        self._restart()
+
+    def _restart(self) -> None:
+        self.board = SerialBoard(self._limits)
+        self._zeros = list(self.shafts)
+        self._demands = [float(shaft) for shaft in self.shafts]
+
+    def _process(self, now: float) -> None:
+        before, milliseconds = self.board.state, math.floor(1e3 * now)
+        is_silent = any("drop" in faults for faults in self._faults.values())
+        late = sum(faults.get("delay", 0.0) for faults in self._faults.values())
+        self.board.poll(milliseconds)
+        for message in frames.take_messages(self._buffer, frames.LONGEST_REQUEST):
+            if is_silent:
+                continue
+            answer = self.board.answer(message, milliseconds)
+            self._queue(now + late + self._wire_time(len(message) + len(answer)), answer)
+            self._has_goals |= message[0] == Request.SETPOINTS
+        if self.board.state != before:
+            for dof in Dof:
+                self._logger(dof)(now, self.board.state.name.lower())
+
+    def _due(self) -> float:
+        if self.board.state != State.ENABLED:
+            return math.inf
+        return 1e-3 * (self.board.heard_at + self.board.watchdog)
+
+    def _advance(self, period: float, now: float) -> list[float]:
+        for dof, at in enumerate(self._at):
+            goal = self.board.targets[at] + self._zeros[dof]
+            step = self._limits[at].speed * period
+            if self.board.state == State.ENABLED:
+                self._demands[dof] += min(max(goal - self._demands[dof], -step), step)
+        return [
+            scale.to_position(round(demand))
+            for scale, demand in zip(self._scales, self._demands, strict=True)
+        ]
+
+    def _move(self, positions: NDArray[np.float64]) -> None:
+        for dof, position in zip(Dof, positions, strict=True):
+            if dof not in self._blocked:
+                self.shafts[dof] = self._scales[dof].to_counts(float(position))
+            self.board.positions[self._at[dof]] = self.shafts[dof] - self._zeros[dof]
+
+    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
+        if kind == "fault":
+            self.board.faults[self._at[dof]] = _DRIVER
+            self._logger(dof)(now, f"fault: {FAULTS[_DRIVER]}")
+        elif kind == "freeze":
+            self._blocked.add(dof)
+        elif kind == "restart":
+            self._restart()
+            self._logger(dof)(now, "restart")
+
+    def _recover(self, dof: Dof) -> None:
+        self._blocked.discard(dof)
+        self.board.faults[self._at[dof]] = 0

@@ -1,0 +1,296 @@
+"""Three motors behind a microcontroller: a `tautscope.hardware.drive_group.DriveGroup`.
+
+Each cycle is one request with the set-points of all axes, which is answered at once by all
+positions and the state. The microcontroller stops the motors by itself if no set-points come for
+`heartbeat_timeout` (docs/serial.md).
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import (
+    DriveError,
+    EmergencyError,
+    ModeRefusedError,
+    SettingRefusedError,
+    SilentDriveError,
+    StateError,
+)
+from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus, NewestAnswer
+from tautscope.hardware.scale import Scale
+from tautscope.hardware.serial_line import frames
+from tautscope.hardware.serial_line.frames import FAULTS, Hello, Limits, Refusal, Request, State
+from tautscope.hardware.serial_line.line import Port, SerialLine
+
+_START = 4.0
+"""How long a microcontroller may take to start after its port was opened [s]."""
+_REPEAT = 0.1
+"""After which time without an answer a request is repeated [s]."""
+_FAULT = "Find the cause, then start with reset_faults"
+
+
+class SerialDrives:
+    """Three motors behind a microcontroller.
+
+    Args:
+        config: Axes, limits and timeouts.
+        port: The open port, which is closed with them.
+
+    Raises:
+        BusError: No microcontroller answers.
+        ModeRefusedError: It speaks another version of the protocol.
+    """
+
+    pending = 1
+
+    def __init__(self, config: DrivesConfig, port: Port) -> None:
+        self._config = config
+        self._name = f"microcontroller on {config.channel}"
+        self._line = SerialLine(port, config.channel)
+        self._feedback = [NewestAnswer() for _ in Dof]
+        self._targets: list[int] = []
+        self._sent_at = 0.0
+        self._is_moving = self._was_enabled = False
+        try:
+            self._axes = self._greet().axes
+        except BaseException:
+            self.close()
+            raise
+
+    def name(self, dof: Dof) -> str:
+        """See `DriveGroup.name`."""
+        return f"{dof.label}, axis {self._config[dof].node}"
+
+    def serial_number(self, dof: Dof) -> str:
+        """Motors have none."""
+        return ""
+
+    def status(self, dof: Dof) -> DriveStatus:
+        """Read state, fault and position.
+
+        Raises:
+            SettingRefusedError: There is no such axis.
+        """
+        limits, at = self._limits(dof), self._config[dof].node - 1
+        status = self._ask(Request.READ)
+        fault, state = status.faults[at], _name(State, status.state)
+        found = f"{state}; {_fault_name(fault) if fault else 'no fault'}; {limits.lower} to "
+        found += f"{limits.upper} counts; up to {limits.speed} counts/s"
+        problem = _FAULT if fault or status.state == State.FAULT else ""
+        if status.state == State.ENABLED:
+            problem = "Its motors are enabled: end the program that uses it"
+        data = {"state": state, "fault": fault, "limits": limits._asdict()}
+        return DriveStatus(status.positions[at], found, problem, data=data)
+
+    def commission(self, dof: Dof) -> CommissionedDrive:
+        """Compare travel and speed limit with the limits of the microcontroller.
+
+        Raises:
+            SettingRefusedError: There is no such axis, or a limit is beyond those.
+        """
+        limits, label = self._limits(dof), dof.label
+        scale = Scale(self._config[dof], label)
+        lower, upper = scale.travel_counts()
+        if lower < limits.lower or upper > limits.upper:
+            raise SettingRefusedError(
+                self.name(dof),
+                f"drives.{label}.travel is {lower} to {upper} counts, and the microcontroller "
+                f"takes {limits.lower} to {limits.upper}",
+                "Correct travel, home or counts_per_unit, or the limits in its program",
+            )
+        if (speed := scale.speed_counts()) > limits.speed:
+            raise SettingRefusedError(
+                self.name(dof),
+                f"drives.{label}.speed_limit is {speed} counts/s, and the microcontroller "
+                f"reaches {limits.speed}",
+                f"Lower drives.{label}.speed_limit, or let a step be a larger motion",
+            )
+        return CommissionedDrive(self.name(dof), 0, 0, 0, limits._asdict())
+
+    def configure(self) -> None:
+        """Do nothing: `enable` sets the watchdog."""
+
+    def read_positions(self) -> list[int]:
+        """Read the positions."""
+        status = self._ask(Request.READ)
+        return [status.positions[self._config[dof].node - 1] for dof in Dof]
+
+    def start(self, positions: list[int]) -> None:
+        """See `DriveGroup.start`."""
+        now = self._sent_at = time.monotonic()
+        for one, position in zip(self._feedback, positions, strict=True):
+            one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, now
+
+    def probe(self) -> list[NewestAnswer]:
+        """Read all axes once."""
+        self._receive(self._line.send(Request.READ))
+        return self._feedback
+
+    def enable(self, *, reset_faults: bool) -> list[NewestAnswer]:
+        """See `DriveGroup.enable`."""
+        status = self._ask(Request.READ)
+        if reset_faults:
+            status = self._ask(Request.DISABLE)
+        self._check_faults(status, StateError)
+        if status.state == State.FAULT:
+            raise StateError(self._name, "a fault has stopped it", _FAULT)
+        self._was_enabled = self._is_moving = True
+        watchdog = struct.pack("<H", round(1e3 * self._config.heartbeat_timeout))
+        status = self._ask(Request.ENABLE, watchdog)
+        if status.state != State.ENABLED:
+            self._check_faults(status, StateError)
+            what = f"it stays {_name(State, status.state)}: {_name(Refusal, status.refusal)}"
+            raise StateError(self._name, what, "Check its program; power-cycle it")
+        self._targets = list(status.positions)
+        targets = [status.positions[self._config[dof].node - 1] for dof in Dof]
+        self.start(targets)
+        return self.exchange(targets)
+
+    def exchange(self, targets: list[int]) -> list[NewestAnswer]:
+        """Send the set-points, read the positions.
+
+        Raises:
+            StateError: It refused set-points, restarted, or stopped for lack of set-points.
+            EmergencyError: A motor has a fault.
+            BusError: The port is lost.
+        """
+        now = time.monotonic()
+        pause, self._sent_at = now - self._sent_at, now
+        if pause > self._config.heartbeat_timeout:
+            raise self._paused(pause)
+        for dof, target in zip(Dof, targets, strict=True):
+            self._targets[self._config[dof].node - 1] = target
+        self._receive(self._line.send(Request.SETPOINTS, frames.setpoints(self._targets)))
+        return self._feedback
+
+    def quick_stop(self) -> list[str]:
+        """Stop all motors, and hold or release them, as `after_quick_stop`."""
+        if not self._is_moving:
+            return []
+        self._is_moving = False
+        is_held = self._config.after_quick_stop == "hold"
+        return self._command(Request.STOP if is_held else Request.DISABLE)
+
+    def disable(self) -> list[str]:
+        """Stop, then switch the motors off."""
+        if not self._was_enabled:
+            return []
+        return self.quick_stop() or self._command(Request.DISABLE)
+
+    def close(self) -> None:
+        """Release the port; a second call does nothing."""
+        self._line.close()
+
+    def _greet(self) -> Hello:
+        """Repeat hello until it is answered: opening the port may restart an Arduino."""
+        deadline = time.monotonic() + _START
+        while time.monotonic() < deadline:
+            number = self._line.send(Request.HELLO)
+            for message in self._line.receive(number, _REPEAT):
+                hello = frames.read_hello(message)
+                if hello is None:
+                    continue
+                if hello.version != frames.VERSION:
+                    raise ModeRefusedError(
+                        self._name,
+                        f"it speaks version {hello.version} of the protocol, and this program "
+                        f"version {frames.VERSION}",
+                        "Load a program with the header of this version (arduino)",
+                    )
+                return hello
+        raise SilentDriveError(
+            self._name,
+            f"no answer for {_START:g} s",
+            "Check drives.channel, drives.bitrate, its supply, and that a program which speaks "
+            "docs/serial.md is loaded",
+        )
+
+    def _limits(self, dof: Dof) -> Limits:
+        if self._config[dof].node > len(self._axes):
+            raise SettingRefusedError(
+                self.name(dof),
+                f"the microcontroller has {len(self._axes)} axes",
+                f"Correct drives.{dof.label}.node",
+            )
+        return self._axes[self._config[dof].node - 1]
+
+    def _ask(self, kind: Request, body: bytes = b"", timeout: float | None = None) -> frames.Status:
+        """Repeat a request until it is answered."""
+        deadline = time.monotonic() + (timeout or self._config.request_timeout)
+        while (now := time.monotonic()) < deadline:
+            number = self._line.send(kind, body)
+            for message in self._line.receive(number, min(_REPEAT, deadline - now)):
+                status = frames.read_status(message, len(self._axes))
+                if status is not None and status.number == number:
+                    return status
+        raise SilentDriveError(self._name, "no answer", "Check its supply and cable")
+
+    def _command(self, kind: Request) -> list[str]:
+        """Carry out a request that stops the motors; names of those that may be moving."""
+        try:
+            if self._ask(kind, timeout=self._config.state_timeout).state != State.ENABLED:
+                return []
+        except DriveError:
+            pass  # silent, or the port is lost
+        return [self.name(dof) for dof in Dof]
+
+    def _receive(self, number: int) -> None:
+        """Wait for an answer; late ones to earlier requests count too."""
+        messages = self._line.receive(number, self._config.reply_timeout)
+        answers = [frames.read_status(message, len(self._axes)) for message in messages]
+        now = time.monotonic()
+        for one in self._feedback:
+            one.age, one.silence = one.age + 1, now - one.answered_at
+        for status in answers:
+            if status is None:
+                continue
+            for dof, one in zip(Dof, self._feedback, strict=True):
+                one.position = status.positions[self._config[dof].node - 1]
+                one.silence, one.answered_at = 0.0, now
+                one.answers += 1
+                one.age = one.age if status.number != number else 0
+            if self._is_moving:
+                self._check(status)
+
+    def _check(self, status: frames.Status) -> None:
+        self._check_faults(status, EmergencyError)
+        if status.state == State.SILENCE:
+            raise self._paused(time.monotonic() - self._sent_at)
+        if status.state != State.ENABLED:
+            raise StateError(
+                self._name,
+                f"it is {_name(State, status.state)}",
+                "If it restarted, it has forgotten its positions: check its supply, and "
+                "drives.*.home",
+            )
+        if status.refusal:
+            what = f"it refused a request: {_name(Refusal, status.refusal)}"
+            raise StateError(self._name, what, "Check its program")
+
+    def _check_faults(self, status: frames.Status, error: type[DriveError]) -> None:
+        for at, fault in enumerate(status.faults):
+            if fault:
+                dofs = [dof for dof in Dof if self._config[dof].node == at + 1]
+                name = self.name(dofs[0]) if dofs else f"axis {at + 1}"
+                raise error(name, f"it reports a fault: {_fault_name(fault)}", _FAULT)
+
+    def _paused(self, pause: float) -> StateError:
+        return StateError(
+            self._name,
+            f"no set-point for {1e3 * pause:.0f} ms or more, and its watchdog is "
+            f"drives.heartbeat_timeout, {1e3 * self._config.heartbeat_timeout:.0f} ms",
+            "Check the load of this computer (tautscope doctor) and the line",
+        )
+
+
+def _fault_name(number: int) -> str:
+    return f"{FAULTS.get(number, 'of its own')} ({number})"
+
+
+def _name(kind: type[State] | type[Refusal], number: int) -> str:
+    known = number in [one.value for one in kind]
+    return kind(number).name.lower() if known else f"{kind.__name__.lower()} {number}"
