@@ -1,7 +1,8 @@
 """Prediction of the tip on records, by the weighted mixture and all other models of `analyze`.
 
-Records of real tools (TAUTSCOPE_DATA), and synthetic families; and the loop's own filter by itself
-on the records of real tools and of a real continuum robot (`--only loop`). `--write` updates
+Records of real tools (TAUTSCOPE_DATA), and synthetic families; the loop's own filter by itself on
+the records of real tools and of a real continuum robot (`--only loop`); and the compensator that
+`analyze` writes, on the other half of its record (`--only compensator`). `--write` updates
 docs/models.md.
 """
 
@@ -22,7 +23,7 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
-from records import loop
+from records import compensator, loop
 from records.evaluation import Job, Result, evaluate
 from records.families import FAMILIES
 from records.tools import SPLICED, tools
@@ -136,11 +137,20 @@ def measure_filter(options: argparse.Namespace) -> dict[str, loop.Errors]:
     return {name: done[name] for name in names}
 
 
+def measure_compensators(options: argparse.Namespace) -> dict[str, list[compensator.Reduction]]:
+    """Evaluate the compensators of all real records whose slack is identified."""
+    names = [name for name in loop.records() if name not in SPLICED]
+    done = dict(run_parallel(compensator.evaluate, names, options.workers, options.scheduler))
+    return {name: done[name] for name in names}
+
+
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="per family [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
-    parser.add_argument("--only", choices=["tools", "families", "loop"], help="[all]")
+    parser.add_argument(
+        "--only", choices=["tools", "families", "loop", "compensator"], help="[all]"
+    )
     parser.add_argument(
         "--baseline",
         type=Path,
@@ -151,10 +161,11 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help="update docs/models.md")
     options = parser.parse_args()
-    if options.write and (options.only not in (None, "loop") or not tools()):
+    is_whole = options.only in (None, "loop", "compensator")
+    if options.write and not (is_whole and tools()):
         parser.error(
             "--write updates whole tables: use it with TAUTSCOPE_DATA, and without --only or with "
-            "--only loop"
+            "--only loop or compensator"
         )
     return options
 
@@ -165,7 +176,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     parts: list[tuple[str, str]] = []
     facts: dict[str, Any] = {"seeds": list(seeds)}
-    if options.only != "loop":
+    if options.only not in ("loop", "compensator"):
         rows = to_rows(measure(options, seeds))
         conditions = f"Families: seeds {seeds[0]} to {seeds[-1]}, median (worst)."
         parts.append(("records", f"{conditions}\n\n{table(rows)}"))
@@ -178,6 +189,8 @@ def main() -> None:
         rows += of_filter
         parts.append(("loop", loop.table(errors, of_filter)))
         facts["errors"] = errors
+    if options.only in (None, "compensator"):
+        parts.append(("compensator", compensator.table(measure_compensators(options))))
     if options.json:
         print(json.dumps({"rows": rows, **facts}))
     else:

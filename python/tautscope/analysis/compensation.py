@@ -1,14 +1,19 @@
-"""What compensation would do: the loop, simulated on the model that was fitted to a record."""
+"""What compensation would do: the loop, simulated on many plays that are fitted to a record."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from tautscope.analysis.identification import Identification
-from tautscope.analysis.models.task import Floats
-from tautscope.config import Config, axes
+from tautscope.analysis.compensator import compensator, scale_of
+from tautscope.analysis.identification import Identification, Interval
+from tautscope.analysis.models import prandtl_ishlinskii
+from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
+from tautscope.analysis.models.task import Floats, extremes
+from tautscope.config import Config, from_document
+from tautscope.loop.actuators import Actuators
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.report.metrics import rms
 from tautscope.runs.records import Record
@@ -21,20 +26,34 @@ LONGEST_INTERVAL = 0.1
 """Between two measured tips of the simulation [s]."""
 LEAST_REDUCTION = 0.1
 """Of the RMS error, from which on the compensator helps."""
+FITTED = 16_000
+"""Most measured tips that the plays of the simulation are fitted to."""
 PERIOD = Config().control.period
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compensation:
-    """RMS of tip minus reference over the second half of the motion [tip's unit].
+    """The second half of a simulated motion [tip's unit].
 
     Attributes:
-        before: The reference is the command.
-        after: With the loop.
+        reference: (n,).
+        without: (n,) tip; the command is the reference.
+        compensated: (n,) tip with the loop.
     """
 
-    before: float
-    after: float
+    reference: Floats
+    without: Floats
+    compensated: Floats
+
+    @property
+    def before(self) -> float:
+        """RMS of tip minus reference without the loop."""
+        return rms(self.without - self.reference)
+
+    @property
+    def after(self) -> float:
+        """RMS of tip minus reference with the loop."""
+        return rms(self.compensated - self.reference)
 
     @property
     def helps(self) -> bool:
@@ -43,45 +62,65 @@ class Compensation:
 
 
 def simulate(record: Record, found: Identification) -> Compensation:
-    """Run the loop of any robot on the fitted plays, with the record's motion as reference.
+    """Run the `compensator` of a record on the plays of the same record."""
+    played, late = as_played(record, found)
+    return run(compensator({"tip": (played, late)}), played, *plant(record, found))
 
-    The tip is measured as often as in the record, with its noise, and arrives late by the delay
-    that was found; its time stamps are right. The delay belongs to the measurement, not to the
-    motion. The simulation's unit is the width.
+
+def plant(record: Record, found: Identification) -> tuple[PrandtlIshlinskii, float]:
+    """Plays of many radii that explain a record, and the RMS error of its tip [tip's unit].
+
+    Without the drift, and with the command as late as the tip. They differ from the plays of
+    `found`, of which the compensator knows.
     """
-    clock = 1.0 if record.is_timed else UNTIMED
-    time = clock * record.clock
-    clock *= min(1.0, LONGEST / float(time[-1] - time[0]))
-    time = clock * (record.clock - record.clock[0])
-    unit = found.width.value
-    path = found.gain * record.command / unit
-    ticks = np.arange(0, time[-1], PERIOD)
-    reference = np.interp(ticks, time, path - (path.max() + path.min()) / 2)
-    size, step = np.abs(reference).max(), np.abs(np.diff(reference)).max()
-    noise = found.noise / unit
-    delay = max(clock * found.delay.value, 0.0)
-    config = axes(
-        1, width_limit=1.5, range=[-size - 2, size + 2], speed=2 * step / PERIOD + 0.1
-    ).replace(
-        **{
-            "measurement.tip_deviation": max(noise / 1.5, 1e-3),
-            "safety.frame_age": max(Config().safety.frame_age, 1.5 * delay),
-        }
+    seen = np.flatnonzero(np.isfinite(record.measured))
+    kept = np.union1d(
+        extremes(record.command, -(-len(record.command) // FITTED)),
+        seen[:: -(-len(seen) // FITTED)],
     )
+    clock = record.clock
+    command = np.interp(clock[kept] - found.delay.value, clock, record.command)
+    tip = (record.measured - found.drift)[kept]
+    plays = prandtl_ishlinskii.fit(command, tip)
+    return plays, rms(plays.predict(command) - tip)
+
+
+def as_played(record: Record, found: Identification) -> tuple[Record, Identification]:
+    """A record with a time from 0 to at most `LONGEST`, and its delay in this time."""
+    clock = 1.0 if record.is_timed else UNTIMED
+    clock *= min(1.0, LONGEST / (clock * float(record.clock[-1] - record.clock[0])))
+    delay = Interval(*(clock * each for each in vars(found.delay).values()))
+    time = clock * (record.clock - record.clock[0])
+    return replace(record, time=time), replace(found, delay=delay)
+
+
+def run(
+    settings: dict[str, Any], record: Record, plays: PrandtlIshlinskii, noise: float
+) -> Compensation:
+    """Run a `compensator` of one degree of freedom on plays, with a record's motion as reference.
+
+    The tip is measured as often as in the record, with noise, and arrives late by the delay of the
+    settings, with a time stamp that is as late. The delay belongs to the measurement, not to the
+    motion.
+    """
+    config = from_document(settings)
+    actuators, loop = Actuators(config), HysteresisReduction(config)
+    time, scale = record.clock, scale_of(record.units[1])
+    ticks = np.arange(0, time[-1], PERIOD)
+    motors = np.interp(ticks, time, record.command)
+    reference = np.array([actuators.dofs([each]) for each in motors.tolist()])
     interval = float(np.median(np.diff(time[np.isfinite(record.measured)])))
     every = max(1, round(min(interval, LONGEST_INTERVAL) / PERIOD))
-    halves = found.half_widths * abs(found.gain) / unit
-    loop, rng = HysteresisReduction(config), np.random.default_rng(0)
-    plain, plays = np.zeros(len(halves)), np.zeros(len(halves))
-    tips = np.empty((len(ticks), 2))
+    delay = max(config.measurement.delays, default=0.0)
     late = round(delay / PERIOD)
+    noises = scale * np.random.default_rng(0).normal(0, noise, len(ticks))
+    radii, weights = np.array(plays.radii), scale * plays.direction * np.array(plays.weights)
+    tips, outputs = np.empty(len(ticks)), np.full(len(radii), motors[0])
     for k, now in enumerate(ticks.tolist()):
-        command = loop.step(reference[k : k + 1], now)[0]
-        plain = np.clip(plain, reference[k] - halves, reference[k] + halves)
-        plays = np.clip(plays, command - halves, command + halves)
-        tips[k] = plain.mean(), plays.mean()
+        motor = actuators.motors(loop.step(reference[k], now))
+        outputs = np.minimum(np.maximum(outputs, motor - radii), motor + radii)
+        tips[k] = weights @ outputs + scale * plays.offset
         if k % every == 0 and k >= late:
-            loop.on_tip([tips[k - late, 1] + rng.normal(0, noise)], float(ticks[k - late]))
-    errors: Floats = tips - reference[:, None]
-    before, after = (unit * rms(each[len(ticks) // 2 :]) for each in errors.T)
-    return Compensation(before, after)
+            loop.on_tip([tips[k - late] + noises[k]], float(ticks[k - late]) + delay)
+    half = slice(len(ticks) // 2, None)
+    return Compensation(reference[half, 0] / scale, plays.predict(motors)[half], tips[half] / scale)

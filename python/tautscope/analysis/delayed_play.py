@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.analysis.models.constant_play import operator
-from tautscope.analysis.models.task import Floats, fit_samples
+from tautscope.analysis.models.task import Floats, extremes, fit_samples
 
 SAMPLES = 4000
 """Largest number of samples in the fit; a longer record is decimated."""
@@ -32,9 +32,13 @@ class Shape:
         return np.asarray(self.radius * (1 + self.rounding * plays))
 
     def output(self, times: Floats, time: Floats, command: Floats) -> Floats:
-        """P(c(t - d)) at the times."""
+        """P(c(t - d)) at the times, for a command that is monotonic between its samples."""
         delayed = np.interp(times - self.delay, time, command)
-        plays = [operator(delayed, each, 0.0) for each in self.half_widths.tolist()]
+        last = np.maximum(np.searchsorted(time, times - self.delay, side="right") - 1, 0)
+        plays = [
+            np.clip(operator(command, each, 0.0)[last], delayed - each, delayed + each)
+            for each in self.half_widths.tolist()
+        ]
         return np.asarray(np.mean(plays, axis=0))
 
 
@@ -48,11 +52,11 @@ class Signals:
     """
 
     def __init__(self, time: Floats, command: Floats, measured: Floats) -> None:
-        self.all_times, self.all_commands = time, command
         seen = np.flatnonzero(np.isfinite(measured))
-        step = -(-len(seen) // SAMPLES)
-        every = np.arange(0, len(command), -(-len(command) // (4 * SAMPLES)))
-        kept = np.union1d(seen[::step], every)
+        size = -(-len(command) // (4 * SAMPLES))
+        knots = extremes(command, size)
+        self.all_times, self.all_commands = time[knots], command[knots]
+        kept = np.union1d(seen[:: -(-len(seen) // SAMPLES)], np.arange(0, len(command), size))
         self.time, self.measured = time[kept], measured[kept]
         self.extent = float(np.ptp(command))
         self.resolution = float(np.min(np.diff(np.unique(measured[seen])), initial=np.inf))

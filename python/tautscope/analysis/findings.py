@@ -23,6 +23,8 @@ LONE = 4
 """Samples in a row that may be an outlier."""
 SPIKE = 0.3
 """Least height of an outlier, as a share of the range."""
+FEW = 1e-3
+"""Share of samples that may repeat a value by chance, and do not matter."""
 _FACTORS = {
     1000.0: "the number of mm in 1 m",
     180 / np.pi: "the number of degrees in a radian",
@@ -98,7 +100,8 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
     ends = {end: sign for end, sign in ends.items() if np.count_nonzero(measured == end) > 5}
     is_held |= np.isin(measured, list(ends))
     fresh = np.where(is_held, np.nan, measured)
-    if np.count_nonzero(is_held) < 5 or len(seen) - np.count_nonzero(is_held) < 50:
+    held = np.count_nonzero(is_held)
+    if held < max(5, FEW * len(seen)) or len(seen) - held < 50:
         return record, found, []
     other = identify(time, record.command, fresh)
     # Noise is cut off near an end: only the model may say which samples are clear of it.
@@ -118,7 +121,7 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
             at_end.append((a, b))
         elif np.max(np.abs(error[a : b + 1])) > 4 * other.noise + 0.01 * extent:
             repeated.append((a, b))
-    if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * np.count_nonzero(is_held):
+    if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * held:
         return record, found, []
     findings = []
     for name, places in (

@@ -1,8 +1,10 @@
-"""The files of an analysis: every sample as CSV, every model's error and loop as a figure."""
+"""The files of an analysis: compensator, verdict and models as figures, samples as CSV."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,11 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from tautscope.analysis.comparison import HORIZONS, Analysis
+from tautscope.analysis.compensator import write_compensator
 from tautscope.analysis.models.registry import LINEAR_FIT
-from tautscope.analysis.models.task import Floats
+from tautscope.analysis.models.task import Floats, extremes
+from tautscope.analysis.slide import slide
+from tautscope.analysis.verdict import Verdict
 from tautscope.figure_style import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
 
@@ -20,18 +25,38 @@ PARTS = 2000
 """Parts of the horizontal axis that are drawn, more than a panel has pixels."""
 
 
-def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
-    """Make a folder with analysis.csv (every sample) and analyze.png, complete or not at all.
+def write_results(
+    results: Sequence[tuple[Verdict, Analysis]], folder: str | PathLike[str]
+) -> dict[str, Any] | None:
+    """Make a folder with the files of all degrees of freedom, complete or not at all.
+
+    analyze.png has the verdict, models.png the comparison, analysis.csv the samples; of several
+    degrees of freedom each has a folder of its name. compensator.toml and compensator.py are for
+    those whose slack is identified; without one they are not written.
+
+    Returns:
+        The configuration in compensator.toml, or None.
 
     Raises:
         OutputError: The folder is not empty, or cannot be written.
     """
+    with new_folder(folder) as place:
+        for verdict, analysis in results:
+            own = place if len(results) == 1 else place / verdict.name
+            own.mkdir(exist_ok=True)
+            _write_one(verdict, analysis, own)
+        known = [verdict for verdict, _ in results if verdict.settings is not None]
+        parts = {verdict.name: (verdict.record, verdict.found) for verdict in known}
+        return write_compensator(parts, place) if parts else None
+
+
+def _write_one(verdict: Verdict, analysis: Analysis, place: Path) -> None:
     columns = _columns(analysis)
-    figure = analysis_figure(analysis)
-    with new_folder(folder) as place, style():
-        table = pl.DataFrame({name: _rounded(values) for name, values in columns.items()})
-        table.fill_nan(None).write_csv(place / "analysis.csv", null_value="nan")
-        figure.savefig(place / "analyze.png")
+    table = pl.DataFrame({name: _rounded(values) for name, values in columns.items()})
+    table.fill_nan(None).write_csv(place / "analysis.csv", null_value="nan")
+    with style():
+        slide(verdict).savefig(place / "analyze.png")
+        analysis_figure(analysis).savefig(place / "models.png")
 
 
 def _rounded(values: Floats | NDArray[np.int64]) -> Floats | NDArray[np.int64]:
@@ -94,13 +119,10 @@ def _draw_horizons(figure: SubFigure, analysis: Analysis) -> None:
 
 def _envelope(x: Floats | NDArray[np.int64], y: Floats) -> tuple[NDArray[Any], Floats]:
     """Samples with the least and the largest y of each of many parts: they draw the same line."""
-    size = len(y) // PARTS
+    size = -(-len(y) // PARTS)
     if size <= 2:
         return x, y
-    parts = y[: PARTS * size].reshape(PARTS, size)
-    begins = size * np.arange(PARTS)
-    ends = parts.argmin(axis=1) + begins, parts.argmax(axis=1) + begins
-    kept = np.unique(np.concatenate([*ends, np.arange(PARTS * size, len(y))]))
+    kept = extremes(y, size)
     return x[kept], y[kept]
 
 

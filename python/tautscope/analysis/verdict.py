@@ -10,6 +10,7 @@ import numpy as np
 
 from tautscope.analysis.comparison import check_motion
 from tautscope.analysis.compensation import Compensation, simulate
+from tautscope.analysis.compensator import compensator, late_by
 from tautscope.analysis.findings import (
     Finding,
     gain_finding,
@@ -21,7 +22,6 @@ from tautscope.analysis.identification import (
     Identification,
     Interval,
 )
-from tautscope.analysis.suggestion import Suggestion, suggest_settings
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.records import Record
 
@@ -34,18 +34,23 @@ class Verdict:
     """What a record of one degree of freedom says.
 
     Attributes:
+        name: Of the degree of freedom.
+        columns: Those of command and tip.
         record: Without the samples that were not measured.
         found: Slack, delay, gain and drift.
         findings: What is wrong with the record.
         compensation: What the loop would do; None where nothing is identified.
-        settings: None where nothing is identified.
+        settings: Of the loop, see `compensator`; None where nothing is identified.
     """
+
+    name: str
+    columns: tuple[str, str]
 
     record: Record
     found: Identification
     findings: tuple[Finding, ...]
     compensation: Compensation | None
-    settings: Suggestion | None
+    settings: dict[str, Any] | None
 
     @property
     def helps(self) -> bool:
@@ -57,7 +62,7 @@ class Verdict:
         """One paragraph."""
         found = self.found
         if found.is_identified:
-            parts = [f"The slack is {self._width()} (95 % interval, {found.strokes} strokes)."]
+            parts = [f"The slack is {self.width} (95 % interval, {found.strokes} strokes)."]
         elif found.is_aligned:
             aligned = f"aligned by its delay of {self._delay()}" if self._is_late else "aligned"
             parts = [
@@ -73,7 +78,8 @@ class Verdict:
             verb = "would fall" if self.helps else "would not fall"
             parts.append(
                 f"With the loop the tip's RMS error {verb} from {self._number(before)} to "
-                f"{self._number(after)}, simulated on this slack with this delay and noise."
+                f"{self._number(after)}, simulated on plays fitted to this record, with its delay "
+                "and noise."
             )
         listed = "; ".join(str(finding) for finding in self.findings)
         parts.append(
@@ -86,6 +92,10 @@ class Verdict:
         found, is_known = self.found, self.found.is_identified or self.found.is_aligned
         width = found.width.value if found.is_identified else 0.0 if found.is_aligned else None
         return {
+            "name": self.name,
+            "command": self.columns[0],
+            "measured": self.columns[1],
+            "verdict": self.text,
             "identified": found.is_identified,
             "aligned": found.is_aligned,
             "width": width,
@@ -102,9 +112,9 @@ class Verdict:
             "explanations": {k: finite_or_none(v) for k, v in found.explanations.items()},
             "compensation": None
             if self.compensation is None
-            else asdict(self.compensation) | {"helps": self.helps},
+            else {name: getattr(self.compensation, name) for name in ("before", "after", "helps")},
             "findings": [asdict(finding) for finding in self.findings],
-            "settings": None if self.settings is None else asdict(self.settings),
+            "settings": self.settings,
         }
 
     @property
@@ -113,16 +123,15 @@ class Verdict:
 
     @property
     def _is_late(self) -> bool:
-        """Whether the delay differs from 0 by more than chance, and by more than a tick."""
-        delay, clock = self.found.delay, self.record.clock
-        tick = (clock[-1] - clock[0]) / len(clock)
-        return abs(delay.value) > max(delay.half, float(tick) / 2)
+        return late_by(self.record, self.found) != 0.0
 
     def _number(self, value: float) -> str:
         unit = self.record.units[1]
         return f"{value:.3g} {unit}".rstrip()
 
-    def _width(self) -> str:
+    @property
+    def width(self) -> str:
+        """The width with half its interval, and its unit."""
         return f"{plus_minus(self.found.width)} {self.record.units[1]}".rstrip()
 
     def _delay(self) -> str:
@@ -147,9 +156,9 @@ class Verdict:
     def _next(self) -> str:
         found = self.found
         if found.is_identified and self.helps:
-            late = found.delay.value if self._is_late and self._clock == "s" else 0.0
-            stamps = f"; set measurement.delays to [{late:.3g}] if it is not in the time stamps"
-            return f"use the settings below{stamps if late > 0 else ''}"
+            late = late_by(self.record, found) if self.record.is_timed else 0.0
+            stamps = "; its measurement.delays is for time stamps as in the record"
+            return f"run compensator.toml{stamps if late > 0 else ''}"
         if found.is_identified:
             return "measure the tip more often, earlier or with less noise, and record again"
         if found.is_aligned:
@@ -168,11 +177,15 @@ class Verdict:
         )
 
 
-def judge(record: Record) -> Verdict:
+def judge(
+    record: Record, name: str = "tip", columns: tuple[str, str] = ("command", "tip")
+) -> Verdict:
     """Leave out wrong samples of a record, fit its slack, and simulate the loop.
 
     Args:
         record: Actuator and tip, each in any unit.
+        name: Of the degree of freedom.
+        columns: Those of command and tip.
 
     Raises:
         RecordError: Command or tip does not move in the first half.
@@ -190,11 +203,13 @@ def judge(record: Record) -> Verdict:
             findings.append(units)
     is_used = found.is_identified
     return Verdict(
+        name,
+        columns,
         record,
         found,
         tuple(findings),
         simulate(record, found) if is_used else None,
-        suggest_settings(record, found) if is_used else None,
+        compensator({name: (record, found)}) if is_used else None,
     )
 
 

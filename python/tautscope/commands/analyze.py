@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
-from pathlib import Path
+import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.analyze_output import print_columns, print_results, results_to_json
+from tautscope.commands.printing import print_json
 from tautscope.config import load_config
+from tautscope.errors import RecordError
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
+    from tautscope.analysis.verdict import Verdict
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -22,10 +25,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "analyze",
         _run,
         help="slack of a recorded file, and what compensation would do",
-        description="Say what slack a CSV or Parquet file with the positions of an actuator and "
-        "its tip has, each in any unit, how sure that is, what compensation would do, what is "
+        description="Say what slack a CSV or Parquet file with the positions of actuators and "
+        "their tips has, each in any unit, how sure that is, what compensation would do, what is "
         "wrong with the record and what to do next. Delimiter, decimal comma, comments and a line "
-        "of units are recognised. Then compares models of hysteresis by the RMS error of the "
+        "of units are recognised. Writes the configuration of a loop for what was identified, and "
+        "a program that runs it. Then compares models of hysteresis by the RMS error of the "
         "predicted tip over the second half: with every measured tip, and with the tip seen only "
         "after each 1, 3 and 10 % of the command's range. On-line models predict each sample "
         "before they use it. With a time, the command is interpolated at the tip's times, and "
@@ -37,12 +41,16 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     analyze.add_argument(
         "--command",
+        nargs="+",
         metavar="COL",
-        help="column of the actuator position, by title or number; without it the columns are "
-        "listed, and pairs proposed",
+        help="columns of the actuators' positions, one per degree of freedom, by title or number; "
+        "without it the columns are listed, and pairs proposed",
     )
     analyze.add_argument(
-        "--measured", metavar="COL", help="column of the tip position, by title or number"
+        "--measured",
+        nargs="+",
+        metavar="COL",
+        help="columns of the tips' positions in the same order, by title or number",
     )
     analyze.add_argument(
         "--time",
@@ -79,7 +87,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     analyze.add_argument(
         "--check",
         action="store_true",
-        help="exit status 1 if the compensator would not help",
+        help="exit status 1 if the compensator would not help in each degree of freedom",
     )
     arguments.add_out(analyze, "analyze")
     arguments.add_config(analyze)
@@ -87,135 +95,85 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from tautscope.analysis.output import write_results  # noqa: PLC0415
+    from tautscope.runs.columns import list_columns  # noqa: PLC0415
+    from tautscope.runs.tables import open_table  # noqa: PLC0415
+
+    if options.command is None and options.measured is None:
+        columns, pairs = list_columns(open_table(options.file))
+        print_columns(options.file, columns, pairs, is_json=options.json)
+        return 0
+    for name in ("command", "measured"):
+        if getattr(options, name) is None:
+            options.usage_error(f"the following arguments are required: --{name}")
+    if len(options.command) != len(options.measured):
+        options.usage_error(
+            f"--command has {len(options.command)} columns, --measured {len(options.measured)}: "
+            "one tip per actuator"
+        )
+    folder = arguments.out_folder(options)
+    results = _results(options)
+    settings = write_results(results, folder)
+    if options.json:
+        print_json({"folder": str(folder), **results_to_json(results, settings)})
+    else:
+        print_results(results, folder)
+    helps = all(verdict.helps for verdict, _ in results)
+    return 0 if helps or not options.check else 1
+
+
+def _results(options: argparse.Namespace) -> list[tuple[Verdict, Analysis]]:
+    """Verdict and comparison of models per degree of freedom; the file is read once."""
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
-    from tautscope.analysis.output import write_analysis  # noqa: PLC0415
     from tautscope.analysis.verdict import judge  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.runs.columns import time_column  # noqa: PLC0415
     from tautscope.runs.records import read_record  # noqa: PLC0415
-    from tautscope.runs.tables import STDIN, open_table  # noqa: PLC0415
-
-    if options.command is None and options.measured is None:
-        return _list(options)
-    for name in ("command", "measured"):
-        if getattr(options, name) is None:
-            options.usage_error(f"the following arguments are required: --{name}")
-    config = load_config(options.config)
-    folder = arguments.out_folder(options)
-    time = options.time
-    if time is None and options.file != STDIN:
-        time = time_column(open_table(options.file).titles)
-    record = read_record(
-        options.file,
-        options.command,
-        options.measured,
-        time,
-        tip_path=options.tip_file,
-        missing=options.missing,
-    )
-    verdict = judge(record)
-    with progress_bar("fits") as progress:
-        analysis = analyze(
-            verdict.record, config, options.update_distance, options.gain, progress=progress
-        )
-    write_analysis(analysis, folder)
-    if options.json:
-        entry = verdict.to_json()
-        pair = {"command": options.command, "measured": options.measured}
-        print_json(
-            {
-                "folder": str(folder),
-                "verdict": verdict.text,
-                "dofs": [pair | entry],
-                **analysis.to_json(),
-                "settings": entry["settings"],
-            }
-        )
-    else:
-        console().print(verdict.text, soft_wrap=True)
-        print()
-        _print(analysis, folder, is_identified=verdict.found.is_identified)
-        if verdict.settings is not None:
-            print(f"\nTo paste into a configuration:\n\n{verdict.settings.to_toml()}")
-    return 0 if verdict.helps or not options.check else 1
-
-
-def _list(options: argparse.Namespace) -> int:
-    """Print the columns with their ranges, and commands to continue with."""
-    import shlex  # noqa: PLC0415
-
-    from rich.table import Table  # noqa: PLC0415
-
-    from tautscope.runs.columns import list_columns  # noqa: PLC0415
     from tautscope.runs.tables import open_table  # noqa: PLC0415
 
-    columns, pairs = list_columns(open_table(options.file))
-    if options.json:
-        proposed = [{"command": command, "measured": tip} for command, tip in pairs]
-        print_json({"columns": [asdict(column) for column in columns], "pairs": proposed})
-        return 0
-    table = Table(box=None, pad_edge=False)
-    for heading in ("number", "title", "unit", "values", "least", "largest"):
-        table.add_column(heading, justify="left" if heading in ("title", "unit") else "right")
-    for each in columns:
-        limits = f"{each.least:.6g}", f"{each.largest:.6g}"
-        table.add_row(str(each.number), each.title, each.unit, str(each.count), *limits)
-    screen = console()
-    screen.print(table)
-    print("\nType one of these:" if pairs else "\nNo two columns move together.")
-    for command, tip in pairs:
-        words = ["tautscope", "analyze", options.file, "--command", command, "--measured", tip]
-        screen.print(f"  {shlex.join(words)}", soft_wrap=True)
-    return 0
+    config = load_config(options.config)
+    sheet = open_table(options.file)
+    tips = sheet if options.tip_file is None else open_table(options.tip_file)
+    time = options.time or time_column(sheet.titles)
+    pairs = list(zip(options.command, options.measured, strict=True))
+    names = _names([tips.titles[tips.index(tip)] for _, tip in pairs])
+    results = []
+    with progress_bar("fits") as progress:
+        for index, (command, tip) in enumerate(pairs):
+
+            def report(share: float, done: int = index) -> None:
+                progress((done + share) / len(pairs))
+
+            try:
+                record = read_record(
+                    sheet,
+                    command,
+                    tip,
+                    time,
+                    tip_path=None if options.tip_file is None else tips,
+                    missing=options.missing,
+                )
+                verdict = judge(record, names[index], (command, tip))
+            except RecordError as error:
+                if len(pairs) > 1:
+                    error.add_note(f"of command {command} and measured {tip}")
+                raise
+            analysis = analyze(
+                verdict.record,
+                config,
+                options.update_distance,
+                options.gain,
+                progress=report,
+            )
+            results.append((verdict, analysis))
+    return results
 
 
-def _print(analysis: Analysis, folder: Path, *, is_identified: bool) -> None:
-    from rich.table import Table  # noqa: PLC0415
+def _names(titles: Sequence[str]) -> list[str]:
+    """Names of degrees of freedom after the titles of their tips, or axis_1, axis_2, ..."""
+    from tautscope.runs.units import split_unit  # noqa: PLC0415
 
-    from tautscope.analysis.comparison import HORIZONS  # noqa: PLC0415
-
-    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = "Error of the predicted tip, RMS over the second half [tip's unit]"
-    table.add_column("model", no_wrap=True)
-    table.add_column("fitted to", no_wrap=True)
-    horizons = [f"{100 * share:.0f} %" for share in HORIZONS]
-    shown = ("gain", "width") if is_identified else ("gain",)
-    for heading in ("every tip", *horizons, *shown):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for entry in analysis.entries:
-        parameters = entry.prediction.parameters
-        table.add_row(
-            entry.model.title,
-            entry.model.fitted_to,
-            f"{entry.rmse:.4g}",
-            *(f"{error.rmse:.4g}" for error in entry.horizons),
-            *(f"{parameters[name]:.4g}" if name in parameters else "" for name in shown),
-        )
-    screen = console()
-    screen.print(table)
-    screen.print(
-        "\nevery tip: models fitted off-line get the command alone. 1 % ...: the tip is seen only "
-        "after this share of the command's range; off-line models continue from the last tip seen.",
-        soft_wrap=True,
-    )
-    screen.print(_cleaning(analysis), soft_wrap=True)
-    screen.print(f"Figure and samples: {folder / 'analyze.png'}", soft_wrap=True)
-
-
-def _cleaning(analysis: Analysis) -> str:
-    record = analysis.record
-    cleaning = record.cleaning
-    counts = {
-        "lines without a command or time, removed": cleaning.blank,
-        "commands interpolated at the tip's times": cleaning.interpolated,
-        "lines without a tip, kept but not scored": cleaning.unseen,
-        "duplicate lines, removed": cleaning.duplicates,
-        "late lines, sorted by time": cleaning.reordered,
-        "clock set back, later times shifted": cleaning.clock_steps,
-        f"gaps in time, the longest {cleaning.longest_gap:.3g} s": cleaning.gaps,
-    }
-    notes = [f"{what}: {number}" for what, number in counts.items() if number]
-    scored = f"{len(record.rows)} samples, {analysis.scored.sum()} of them scored"
-    if record.time is None:
-        notes.append("delay in samples; order and duplicates not checked without --time")
-    return "; ".join([scored, *notes]) + "."
+    plain = [split_unit(title)[0].lower() for title in titles]
+    names = [re.sub(r"[^a-z0-9]+", "_", each).strip("_")[:32] for each in plain]
+    is_usable = len(set(names)) == len(names) and all(re.match("[a-z]", each) for each in names)
+    return names if is_usable else [f"axis_{index + 1}" for index in range(len(names))]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
-from tautscope.runs.tables import filled, read_table
+from tautscope.runs.tables import Sheet, filled, open_table, read_table
 from tautscope.runs.units import TIMES, time_scale, units_of
 
 Floats = NDArray[np.float64]
@@ -85,12 +85,12 @@ class Record:
 
 
 def read_record(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | Sheet,
     command: str,
     measured: str,
     time: str | None = None,
     *,
-    tip_path: str | PathLike[str] | None = None,
+    tip_path: str | PathLike[str] | Sheet | None = None,
     missing: Sequence[float] = (),
 ) -> Record:
     """Read columns of a CSV or Parquet file, and clean them.
@@ -102,7 +102,8 @@ def read_record(
     `Cleaning`; without one the order of the file is kept.
 
     Args:
-        path: The file, see `tautscope.runs.tables.read_table`; ``-`` is standard input.
+        path: The file, see `tautscope.runs.tables.read_table`; ``-`` is standard input. Or one that
+            is open, for several records of it.
         command: Column of the actuator position.
         measured: Column of the tip position.
         time: Column of the time, in s or the unit of its title, since 1970 by its size, or a date
@@ -116,13 +117,15 @@ def read_record(
         RecordError: A column is missing, a cell is not a number, or fewer than two samples have a
             tip; the error names file, line and column.
     """
+    sheet = path if isinstance(path, Sheet) else open_table(path)
     if tip_path is None:
-        table, rows, units = _read(path, (command, measured), time)
+        table, rows, units = _read(sheet, (command, measured), time)
     else:
+        tips = tip_path if isinstance(tip_path, Sheet) else open_table(tip_path)
         if time is None:
-            raise RecordError(str(tip_path), "no time", "a column of the time in both files")
-        motor, motor_rows, motor_units = _read(path, (command,), time)
-        tip, tip_rows, tip_units = _read(tip_path, (measured,), time)
+            raise RecordError(tips.file, "no time", "a column of the time in both files")
+        motor, motor_rows, motor_units = _read(sheet, (command,), time)
+        tip, tip_rows, tip_units = _read(tips, (measured,), time)
         nothing = [np.full((len(each), 1), np.nan) for each in (motor, tip)]
         table = np.vstack(
             [
@@ -145,23 +148,23 @@ def read_record(
     for column, name in enumerate((command, measured)):
         count = int(np.count_nonzero(np.isfinite(table[:, column])))
         if count < 2:
-            raise RecordError(f"{path}, column {name}", f"{count} samples", "at least 2")
+            raise RecordError(f"{sheet.file}, column {name}", f"{count} samples", "at least 2")
     return replace(_clean(table, rows, int(np.count_nonzero(is_blank))), units=(units[0], units[1]))
 
 
 def _read(
-    path: str | PathLike[str], names: tuple[str, ...], time: str | None
+    sheet: Sheet, names: tuple[str, ...], time: str | None
 ) -> tuple[Floats, NDArray[np.int64], tuple[str, ...]]:
     """Columns, the last one the time [s] if there is one, their lines, and units."""
     wanted = names if time is None else (*names, time)
-    found = read_table(path, wanted)
+    found = sheet.read(wanted)
     table = np.stack([found.columns[name] for name in wanted], axis=1)
     if time is not None:
         stamps = table[:, -1]
         unit = found.units.get(time, "")
         if unit and unit not in TIMES:
             allowed = f"one of {', '.join(TIMES)}"
-            raise RecordError(f"{path}, column {time}", f"unit {unit}", allowed)
+            raise RecordError(f"{sheet.file}, column {time}", f"unit {unit}", allowed)
         table[:, -1] = stamps * time_scale(float(np.nanmedian(stamps)), unit)
     return table, found.rows, tuple(found.units.get(name, "") for name in names)
 

@@ -92,6 +92,18 @@ def continued(predicted: Floats, measured: Floats) -> Floats:
     return predicted + np.where(at >= 0, (measured - predicted)[at], 0.0)
 
 
+def extremes(values: Floats, size: int) -> NDArray[np.intp]:
+    """Samples with the least and the largest value of each part of `size` samples, in order.
+
+    The samples of a last, shorter part are all contained.
+    """
+    parts = len(values) // size
+    blocks = values[: parts * size].reshape(parts, size)
+    begins = size * np.arange(parts)
+    ends = blocks.argmin(axis=1) + begins, blocks.argmax(axis=1) + begins
+    return np.unique(np.concatenate([*ends, np.arange(parts * size, len(values))]))
+
+
 def essential(command: Floats, measured: Floats) -> tuple[Floats, Floats]:
     """The samples with a tip, and those at which the command turns, stops or starts.
 

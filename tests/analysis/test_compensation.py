@@ -1,0 +1,61 @@
+"""What the verdict says that the loop would do, and its figure."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.text import Annotation
+from simulated import simulate
+from tautscope.analysis.compensation import as_played, plant, run
+from tautscope.analysis.compensator import compensator
+from tautscope.analysis.slide import slide
+from tautscope.analysis.verdict import Verdict, judge
+from tautscope.runs.records import Cleaning, Record, read_record
+
+
+def judged(kind: str, seed: int) -> Verdict:
+    return judge(simulate(kind, seed).record)
+
+
+def test_the_loop_does_on_the_other_half_what_the_verdict_says(tool_folder: Path) -> None:
+    """A real tool: slack of the second half, plays fitted to the first; within 10 points."""
+    record = read_record(tool_folder / "tool4_L4_run23.csv", "motor_deg", "jaw_deg")
+    half = len(record.rows) // 2
+    first, second = (
+        judge(Record(record.command[k], record.measured[k], None, record.rows[k], Cleaning()))
+        for k in (slice(half), slice(half, None))
+    )
+    assert second.compensation is not None
+    said = 1 - second.compensation.after / second.compensation.before
+    settings = compensator({"tip": as_played(second.record, second.found)})
+    played, _ = as_played(first.record, first.found)
+    reached = run(settings, played, *plant(first.record, first.found))
+    assert 0.5 < said < 1
+    assert 1 - reached.after / reached.before == pytest.approx(said, abs=0.1)
+
+
+@pytest.mark.parametrize("kind", ["play", "delay and play", "drift"])
+def test_without_the_loop_the_error_is_that_of_the_play(kind: str) -> None:
+    """Half the width to both sides, less while the slack is crossed: 0.35 to 0.5 widths."""
+    truth, verdict = simulate(kind, 3), judged(kind, 3)
+    assert verdict.compensation is not None
+    assert 0.35 < verdict.compensation.before / truth.width < 0.5
+    assert verdict.compensation.helps
+
+
+def test_the_figure_marks_the_width_only_where_it_is_identified() -> None:
+    truth, verdict = simulate("delay and play", 1), judged("delay and play", 1)
+    loop, time = slide(verdict).axes
+    arrow = loop.texts[0]
+    assert isinstance(arrow, Annotation)
+    (left, low), (right, high) = arrow.xy, arrow.xyann
+    assert abs(right - left) == pytest.approx(truth.width, rel=0.1)
+    assert low == high
+    assert verdict.width in loop.texts[1].get_text()
+    # The ends of the arrow are on the sides of the loop, of whose samples many are at rest.
+    x, y = (np.asarray(each, float) for each in loop.lines[0].get_data())
+    near = np.abs(y - low) < 0.05 * np.ptp(y)
+    assert left - 0.1 * truth.width < np.median(x[near]) < right + 0.1 * truth.width
+    assert [line.get_label() for line in time.lines] == ["measured", "predicted"]
+    for kind in ("linear", "random walk"):
+        assert not slide(judged(kind, 1)).axes[0].texts
