@@ -1,10 +1,12 @@
-"""Stopping time of the drives, and jitter of the set-points, over the bus between two processes.
+"""Stopping time of the motors, and jitter of the set-points, over the bus between two processes.
 
-One process simulates the drives, this one controls them with the timing of
-`tautscope.config.DrivesConfig` (100 Hz, heartbeats of 20 ms, lost after 80 ms). A stopping time is
-measured by the drives, on the monotonic clock: from the fault to the quick stop of the last drive
-that can stop. ``--seconds`` is the duration of the stream of set-points; ``--realtime`` requests
-SCHED_FIFO for both processes.
+One process simulates the motors of a configuration, this one controls them (``bench``: CiA 402
+drives at 100 Hz, heartbeats of 20 ms, lost after 80 ms). A stopping time is measured on the
+monotonic clock: of CiA 402 drives from the fault to the quick stop of the last drive that can stop;
+of motors on a serial line to the error of the controller, which has told them to hold before (and
+has asked a silent one to for a second), and after the end of the controller to the stop by the
+watchdog, which a Feetech servo has not. ``--seconds`` is the duration of the stream of set-points;
+``--realtime`` requests SCHED_FIFO for both processes.
 """
 
 from __future__ import annotations
@@ -26,31 +28,36 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from bench.processes import BENCH, Rig
+from bench.processes import Rig
 from tautscope.config import DrivesConfig, dump_config, load_config
 from tautscope.errors import DriveError
 from tautscope.hardware.drives import Drives, open_drives
 
+BENCH = "bench"
 SPEED = np.array([0.01, 1.5, 0.8])
 """Largest speed of the motors [m/s, rad/s, rad/s]."""
-FAULTS = {
-    "heartbeat": ("heartbeat of a drive lost", 100.0),
+FAULTS: dict[str, tuple[str, float | None]] = {
     "drop": ("a drive silent", 100.0),
     "delay": ("a drive answers 0.3 s late", 100.0),
     "fault": ("a drive's emergency", 100.0),
-    "refuse": ("a drive leaves its mode", 100.0),
     "freeze": ("a motor stands still at full test speed", None),
 }
+OF_CIA_402: dict[str, tuple[str, float | None]] = {
+    "heartbeat": ("heartbeat of a drive lost", 100.0),
+    "refuse": ("a drive leaves its mode", 100.0),
+}
+ON_LINE: dict[str, tuple[str, float | None]] = {"restart": ("supply fails for a moment", None)}
+STOPS = {"canopen": "quick stop active", "dynamixel": "bus watchdog", "serial": "silence"}
+"""Event of the motors after the end of the controller, by protocol."""
 
 
 @contextmanager
-def simulated_drives(folder: Path) -> Iterator[tuple[Path, Rig]]:
-    """Start the simulated drives; yield the configuration file, and their process."""
-    socket, file = folder / "can", folder / "rig.toml"
-    config = load_config(BENCH).replace(**{"drives.channel": str(socket)})
+def simulated_drives(folder: Path, bench: str) -> Iterator[tuple[Path, Rig]]:
+    """Start the simulated motors; yield the configuration file, and their process."""
+    file = folder / "rig.toml"
+    config = load_config(bench).replace(**{"drives.channel": str(folder / "bus")})
     file.write_text(dump_config(config), encoding="utf-8")
-    command = [sys.executable, "-m", "tautscope.bench.drives"]
-    command += ["--config", str(file), "--socket", str(socket)]
+    command = [sys.executable, "-m", "tautscope.bench.any_motors", "--config", str(file)]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
@@ -81,40 +88,45 @@ def stream(drives: Drives, seconds: float, begin: np.ndarray) -> list[float]:
     return took
 
 
-def last_stop(process: Rig, stops: int) -> float:
+def last_stop(process: Rig, stops: int, what: str) -> float:
     """Return when the last of so many drives stopped [s]."""
-    return max(process.event("quick stop active") for _ in range(stops))
+    return max(process.event(what) for _ in range(stops))
 
 
-def stop_times(kind: str, repeats: int) -> list[float]:
-    """Return the times from a fault to the quick stop of all drives that can stop [ms]."""
+def stop_times(kind: str, repeats: int, bench: str) -> list[float]:
+    """Return the times from a fault to the stop [ms], see above."""
     times = []
     for _ in range(repeats):
         with (
             tempfile.TemporaryDirectory() as folder,
-            simulated_drives(Path(folder)) as (file, process),
+            simulated_drives(Path(folder), bench) as (file, process),
         ):
             try:
                 with open_drives(drives_config(file)) as drives:
                     begin = drives.start()
                     stream(drives, 0.3, begin)
                     process.request(f"{kind} rotation")
-                    stream(drives, 10.0, drives.last_command)
+                    try:
+                        stream(drives, 10.0, drives.last_command)
+                    finally:
+                        stopped = time.monotonic()
             except DriveError:
                 began = process.event(f"fault: {kind}")
-                times.append((last_stop(process, 2) - began) * 1e3)
+                if bench == BENCH:
+                    stopped = last_stop(process, 2, STOPS["canopen"])
+                times.append((stopped - began) * 1e3)
             else:
                 raise RuntimeError(f"the fault {kind!r} was not detected")
     return times
 
 
-def killed_times(number: int, repeats: int) -> list[float]:
-    """Return the times from a signal to the controller to the quick stop of all drives [ms]."""
+def killed_times(number: int, repeats: int, bench: str, stop: str) -> list[float]:
+    """Return the times from a signal to the controller to the stop of all drives [ms]."""
     times = []
     for _ in range(repeats):
         with (
             tempfile.TemporaryDirectory() as folder,
-            simulated_drives(Path(folder)) as (file, process),
+            simulated_drives(Path(folder), bench) as (file, process),
         ):
             command = [sys.executable, str(Path(__file__).parent), "--follow", str(file)]
             with subprocess.Popen(
@@ -124,7 +136,7 @@ def killed_times(number: int, repeats: int) -> list[float]:
                 master.stdout.readline()
                 began = time.monotonic()
                 master.send_signal(number)
-                times.append((last_stop(process, 3) - began) * 1e3)
+                times.append((last_stop(process, 3, stop) - began) * 1e3)
     return times
 
 
@@ -153,10 +165,10 @@ def row(what: str, unit: str, values: list[float], goal: float | None) -> dict[s
     }
 
 
-def streaming_rows(seconds: float) -> list[dict[str, Any]]:
+def streaming_rows(seconds: float, bench: str) -> list[dict[str, Any]]:
     with (
         tempfile.TemporaryDirectory() as folder,
-        simulated_drives(Path(folder)) as (file, _),
+        simulated_drives(Path(folder), bench) as (file, _),
         open_drives(drives_config(file)) as drives,
     ):
         took = stream(drives, seconds, drives.start())
@@ -175,6 +187,7 @@ def streaming_rows(seconds: float) -> list[dict[str, Any]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--config", default=BENCH, help="bench, bench_dynamixel, ... [bench]")
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--realtime", action="store_true")
@@ -185,13 +198,19 @@ def main() -> None:
     if arguments.follow:
         follow(arguments.follow)
         return
-    repeats = arguments.repeats
-    rows = streaming_rows(arguments.seconds)
-    for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
-        what = f"{number.name} to the controller, to quick stop"
-        rows.append(row(what, "ms", killed_times(number, repeats), 100.0))
-    for kind, (what, goal) in FAULTS.items():
-        rows.append(row(f"{what}, to quick stop", "ms", stop_times(kind, repeats), goal))
+    bench, repeats = arguments.config, arguments.repeats
+    protocol = load_config(bench).drives.protocol
+    rows = streaming_rows(arguments.seconds, bench)
+    is_cia_402 = protocol == "canopen"
+    # A controller that is told to end holds motors on a line where they are, without an event.
+    for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)[: 3 if is_cia_402 else 1]:
+        if stop := STOPS.get(protocol):
+            what = f"{number.name} to the controller, to {stop}"
+            rows.append(row(what, "ms", killed_times(number, repeats, bench, stop), 100.0))
+    end = "to quick stop" if is_cia_402 else "to the error of the controller"
+    for kind, (what, limit) in (FAULTS | (OF_CIA_402 if is_cia_402 else ON_LINE)).items():
+        goal = limit if is_cia_402 else None
+        rows.append(row(f"{what}, {end}", "ms", stop_times(kind, repeats, bench), goal))
     if arguments.json:
         print(
             json.dumps(

@@ -86,7 +86,7 @@ def rig(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str], Lines]]:
     config = from_document({"drives": drives_document(channel=str(socket))})
     file = tmp_path / "rig.toml"
     file.write_text(dump_config(config), encoding="utf-8")
-    arguments = ("-m", "tautscope.bench.drives", "--config", str(file), "--socket", str(socket))
+    arguments = ("-m", "tautscope.bench.any_motors", "--config", str(file))
     with process(*arguments) as (bench, lines):
         lines.until("ready")
         yield file, bench, lines
@@ -215,7 +215,7 @@ def test_drives_in_the_background_serve_a_master_until_a_signal(
     socket, file = tmp_path / "can", tmp_path / "rig.toml"
     config = from_document({"drives": drives_document(channel=str(socket))})
     file.write_text(dump_config(config), encoding="utf-8")
-    arguments = ("-m", "tautscope.bench.drives", "--config", str(file), "--socket", str(socket))
+    arguments = ("-m", "tautscope.bench.any_motors", "--config", str(file))
     with background(nothing, *arguments) as (shell, job):
         with process(MASTER, str(file), "return") as (master, _):
             assert master.wait(TIMEOUT) == 0

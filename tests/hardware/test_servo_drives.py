@@ -223,7 +223,11 @@ def test_fault_persists_until_it_is_reset(protocol: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"node": 9}, SilentDriveError, "rotation.node.*ids 1, 2, 3 answer at 1000000"),
+        (
+            {"node": 9},
+            SilentDriveError,
+            "rotation.node.*ids [123, ]+ answer at 1000000",
+        ),  # each, unless the computer is busy
         ({}, ModeRefusedError, "it is a .* not a .*Correct drives.rotation.model"),
         ({"travel": [-1e4, 0.0]}, SettingRefusedError, "It counts to"),
     ],

@@ -1,38 +1,26 @@
 """Three simulated CiA 402 drives that move a plant, with fault injection.
 
-    with Hub(path), LocalBus(path) as bus, SimulatedDrives(bus, truth, plant) as drives: ...
-
-``python -m tautscope.bench.drives --config FILE --socket PATH`` runs them in a process: it reads
-faults from its standard input, one per line (``freeze rotation``, ``clear rotation``), writes
-events as JSON lines, and ends with its input, as ``tautscope bench``.
+with Hub(path), LocalBus(path) as bus, SimulatedDrives(bus, truth, plant) as drives: ...
 """
 
 from __future__ import annotations
 
-import argparse
 import heapq
 import itertools
-import json
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Literal, get_args
 
 import can
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
-from tautscope.bench.events import EventPrinter
 from tautscope.bench.motors import SimulatedMotors
-from tautscope.bench.requests import read_requests
-from tautscope.config import DrivesConfig, load_config
+from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError
 from tautscope.hardware.cia402 import State
-from tautscope.hardware.signals import exit_on_signals
 
 FaultKind = Literal["drop", "delay", "fault", "freeze", "heartbeat", "refuse"]
 """drop: neither sends nor receives. delay: sends late. fault: emergency object and fault state.
@@ -165,32 +153,3 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
                 self._transmit(message)
 
         return send
-
-
-def main() -> None:
-    """Run simulated CiA 402 drives in a process."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--config", required=True, help="TOML with a section [drives]")
-    parser.add_argument("--socket", required=True, help="path of the bus")
-    parser.add_argument("--modes", type=int, nargs="+", default=[7, 8])
-    parser.add_argument("--start", type=float, nargs=3, default=[0.0, 0.0, 0.0])
-    arguments = parser.parse_args()
-    config = load_config(arguments.config).drives
-    if config is None:
-        raise ConfigError("drives", None, "a section [drives]")
-    start, modes = np.array(arguments.start), tuple(arguments.modes)
-    with exit_on_signals(), Hub(arguments.socket), LocalBus(arguments.socket) as bus:
-        drives = SimulatedDrives(bus, config, start=start, modes=modes)
-        with drives:
-            printer = EventPrinter(lambda: drives.events)
-            print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-            with suppress(KeyboardInterrupt):
-                for line in read_requests():
-                    kind, label = line.split()
-                    dof = Dof[label.upper()]
-                    drives.clear(dof) if kind == "clear" else drives.inject(kind, dof)  # type: ignore[arg-type]
-        printer.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""What simulated drives and servos have in common: a thread, faults on request, events."""
+"""What all simulated motors have in common: a thread, faults on request, events."""
 
 from __future__ import annotations
 

@@ -16,15 +16,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.bench.any_motors import make_motors
 from tautscope.bench.camera import CameraStream, Centreline
-from tautscope.bench.can_bus import Hub, LocalBus
-from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import Event
 from tautscope.bench.ground_truth import GroundTruthWriter
-from tautscope.bench.microcontroller import SimulatedMicrocontroller
-from tautscope.bench.servos import SimulatedServos
 from tautscope.config import Config
-from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.rig import require_drives
@@ -55,11 +51,6 @@ class Bench:
         self, config: Config, truth: Path | None = None, *, modes: tuple[int, ...] = (7, 8)
     ) -> None:
         drives = require_drives(config)
-        is_on_line = drives.protocol in SERIAL_PORTS
-        if not is_on_line and drives.interface != "tautscope":
-            raise ConfigError("drives.interface", drives.interface, "tautscope, on the bench")
-        if is_on_line and drives.channel.startswith("/dev/"):
-            raise ConfigError("drives.channel", drives.channel, "no device, on the bench")
         url = config.camera.source.url
         if not url.startswith("unix:"):
             raise ConfigError("camera.source.url", url, "unix:PATH, on the bench")
@@ -77,15 +68,9 @@ class Bench:
         try:
             if truth is not None:
                 self._truth = self._resources.enter_context(GroundTruthWriter(truth))
-            start = self._plant.applied
-            self.drives: SimulatedDrives | SimulatedServos | SimulatedMicrocontroller
-            if drives.protocol == PROTOCOL:
-                self.drives = SimulatedMicrocontroller(drives, self._on_sync, start=start)
-            elif is_on_line:
-                self.drives = SimulatedServos(drives, self._on_sync, start=start)
-            else:
-                bus = self._open_bus(drives.channel)
-                self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
+            self.drives = make_motors(
+                drives, self._resources, self._on_sync, start=self._plant.applied, modes=modes
+            )
         except BaseException:
             self._resources.close()
             raise
@@ -123,14 +108,6 @@ class Bench:
 
     def __exit__(self, *failure: object) -> None:
         self._resources.close()
-
-    def _open_bus(self, channel: str) -> LocalBus:
-        try:
-            self._resources.enter_context(Hub(channel))
-        except OSError as error:
-            allowed = f"a socket that can be made ({error}); is another bench running?"
-            raise ConfigError("drives.channel", channel, allowed) from None
-        return self._resources.enter_context(LocalBus(channel))
 
     def _centreline(self) -> Centreline:
         with self._lock:

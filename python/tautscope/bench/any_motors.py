@@ -1,0 +1,94 @@
+"""The simulated motors of a configuration, whatever their protocol.
+
+``python -m tautscope.bench.any_motors --config FILE`` runs them in a process, without a plant: it
+reads faults from its standard input, one per line (``freeze rotation``, ``clear rotation``), writes
+events as JSON lines, and ends with its input, as ``tautscope bench``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from contextlib import ExitStack, suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.drives import OnSync, SimulatedDrives
+from tautscope.bench.events import EventPrinter
+from tautscope.bench.microcontroller import SimulatedMicrocontroller
+from tautscope.bench.requests import read_requests
+from tautscope.bench.servos import SimulatedServos
+from tautscope.config import DrivesConfig, load_config
+from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.hardware.signals import exit_on_signals
+
+Motors = SimulatedDrives | SimulatedServos | SimulatedMicrocontroller
+
+
+def make_motors(
+    config: DrivesConfig,
+    resources: ExitStack,
+    on_cycle: OnSync | None = None,
+    *,
+    start: NDArray[np.float64],
+    modes: tuple[int, ...] = (7, 8),
+) -> Motors:
+    """The motors of a configuration, not yet running.
+
+    Args:
+        config: ``channel`` names the socket of the bus, or the link to the pseudo-terminal.
+        resources: Closes the bus.
+        on_cycle: The plant; without it, the motors follow ideally.
+        start: Positions (3,) [m, rad, rad].
+        modes: Supported modes of operation of CiA 402 drives.
+
+    Raises:
+        ConfigError: The configuration does not describe a bench, or a socket cannot be made.
+    """
+    if config.protocol in SERIAL_PORTS:
+        if config.channel.startswith("/dev/"):
+            raise ConfigError("drives.channel", config.channel, "no device, on the bench")
+        if config.protocol == PROTOCOL:
+            return SimulatedMicrocontroller(config, on_cycle, start=start)
+        return SimulatedServos(config, on_cycle, start=start)
+    if config.interface != "tautscope":
+        raise ConfigError("drives.interface", config.interface, "tautscope, on the bench")
+    try:
+        resources.enter_context(Hub(config.channel))
+    except OSError as error:
+        allowed = f"a socket that can be made ({error}); is another bench running?"
+        raise ConfigError("drives.channel", config.channel, allowed) from None
+    bus = resources.enter_context(LocalBus(config.channel))
+    return SimulatedDrives(bus, config, on_cycle, start=start, modes=modes)
+
+
+def main() -> None:
+    """Run simulated motors in a process."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--config", required=True, help="TOML with a section [drives]")
+    parser.add_argument("--modes", type=int, nargs="+", default=[7, 8])
+    parser.add_argument("--start", type=float, nargs=3, default=[0.0, 0.0, 0.0])
+    arguments = parser.parse_args()
+    config = load_config(arguments.config).drives
+    if config is None:
+        raise ConfigError("drives", None, "a section [drives]")
+    start, modes = np.array(arguments.start), tuple(arguments.modes)
+    with exit_on_signals(), ExitStack() as resources:
+        with make_motors(config, resources, start=start, modes=modes) as motors:
+            printer = EventPrinter(lambda: motors.events)
+            print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
+            with suppress(KeyboardInterrupt):
+                for line in read_requests():
+                    kind, label = line.split()
+                    dof = Dof[label.upper()]
+                    motors.clear(dof) if kind == "clear" else motors.inject(kind, dof)  # type: ignore[arg-type]
+        printer.close()
+
+
+if __name__ == "__main__":
+    main()
