@@ -159,7 +159,7 @@ def conditions(options: argparse.Namespace) -> str:
     first, last = options.first_seed, options.first_seed + options.seeds - 1
     seeds = f"Seed {first}" if first == last else f"Seeds {first} to {last}"
     source = "true features with noise" if options.features else "camera images"
-    return f"{seeds}, {source}, median (worst)."
+    return f"{seeds}, {source}, median"
 
 
 if __name__ == "__main__":

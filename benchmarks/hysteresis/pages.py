@@ -8,14 +8,16 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from hysteresis.figures import FIGURES
 from hysteresis.tables import Row, full
+from tautscope.dof import Dof
 
 PAGE = ROOT / "docs" / "hysteresis.md"
 FOLDER = ROOT / "docs" / "figures" / "hysteresis"
+DOFS = " / ".join(dof.label for dof in Dof)
 
 
 def write_tables(rows: Sequence[Row], drawn: Sequence[str], conditions: str) -> None:
     """Write the table of the page, and its figures."""
-    insert(PAGE, "hysteresis", f"{conditions}\n\n{full(rows)}")
+    insert(PAGE, "hysteresis", f"{conditions} (worst) of {DOFS}.\n\n{full(rows)}")
     folder = FOLDER.relative_to(PAGE.parent).as_posix()
     images = [f"![{FIGURES[name][1]}]({folder}/{name}.png)" for name in drawn]
     captions = [f"*{FIGURES[name][1]}.*" for name in drawn]
@@ -25,4 +27,4 @@ def write_tables(rows: Sequence[Row], drawn: Sequence[str], conditions: str) -> 
 
 def write_ablation(table: str, conditions: str) -> None:
     """Write the table of the ablation."""
-    insert(PAGE, "ablation", f"{conditions.removesuffix(' (worst).')}.\n\n{table}")
+    insert(PAGE, "ablation", f"{conditions} of {DOFS}.\n\n{table}")

@@ -148,9 +148,11 @@ def _triple(rows: Sequence[Row]) -> str:
 
 def _goals(rows: Sequence[Row]) -> str:
     """The goal of a quantity, and the DOFs that miss it."""
-    limits = list(dict.fromkeys(row["goal"] for row in rows))
-    if limits in ([], [None]):
+    limits = [row["goal"] for row in rows]
+    if not limits or limits[0] is None:
         return ""
+    if len(set(limits)) == 1:
+        del limits[1:]
     bound = "at least" if rows[0]["sense"] == "min" else "at most"
     unit = rows[0]["unit"]
     text = " / ".join(show(limit, unit).removesuffix(" %").removesuffix(".0") for limit in limits)

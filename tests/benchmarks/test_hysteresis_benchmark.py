@@ -114,7 +114,7 @@ def test_a_line_of_the_page_has_every_dof_and_what_misses_the_goal() -> None:
     )
     first, last = tables.full(found).splitlines()[2:]
     assert first == f"| {NAME} | 98.0 / 85.0 (97.0 / 80.0) % |  | at least 95 %; missed: rotation |"
-    assert last == (
+    assert last == (  # of all conditions as one
         "| 2 image conditions: largest change of reduction | 2.0 (2.0) % |  | at most 3 % |"
     )
 

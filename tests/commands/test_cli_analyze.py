@@ -42,6 +42,7 @@ def analyzed(
     printed, progress = capsys.readouterr()
     assert progress == ""  # which is for a terminal
     document: dict[str, Any] = json.loads(printed)
+    assert document["models"] == document["dofs"][0]["models"]
     document |= document["dofs"][0]
     document["models"] = {model["name"]: model for model in document["models"]}
     return document

@@ -44,12 +44,16 @@ def print_columns(
 def results_to_json(
     results: Sequence[tuple[Verdict, Analysis]], settings: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """Verdicts, all fields of each degree of freedom, and settings of the loop for all of them."""
-    return {
+    """Verdicts, all fields of each degree of freedom, and settings of the loop for all of them.
+
+    The comparison of models of a single degree of freedom is also at the top.
+    """
+    document = {
         "verdict": _text(results),
         "dofs": [verdict.to_json() | analysis.to_json() for verdict, analysis in results],
         "settings": settings,
     }
+    return document | results[0][1].to_json() if len(results) == 1 else document
 
 
 def print_results(results: Sequence[tuple[Verdict, Analysis]], folder: Path) -> None:
