@@ -25,7 +25,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "analyze",
         _run,
         help="slack of a recorded file, and what compensation would do",
-        description="Say what slack a CSV or Parquet file with the positions of actuators and "
+        description="Say what slack a table with the positions of actuators and "
         "their tips has, each in any unit, how sure that is, what compensation would do, what is "
         "wrong with the record and what to do next. Delimiter, decimal comma, comments and a line "
         "of units are recognised. Writes the configuration of a loop for what was identified, and "
@@ -37,7 +37,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         extras=["analysis"],
     )
     analyze.add_argument(
-        "file", metavar="FILE", help="CSV with a header line, or Parquet; - reads standard input"
+        "file", metavar="FILE", help="CSV, Parquet, .npz or .mat; - reads standard input"
     )
     analyze.add_argument(
         "--command",

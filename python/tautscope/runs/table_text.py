@@ -163,7 +163,7 @@ def _unpacked(data: bytes, file: str) -> bytes:
 
 
 def _as_utf8(data: bytes, file: str) -> bytes:
-    allowed = "a CSV file, also as .gz, or a Parquet file"
+    allowed = "a CSV file, also as .gz, or a Parquet, .npz or .mat file"
     for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
         if data.startswith(mark):
             try:

@@ -1,4 +1,4 @@
-"""Columns of recorded tables: CSV of any dialect, Parquet, standard input; read with Polars."""
+"""Columns of recorded tables: CSV of any dialect, Parquet, arrays, standard input; with Polars."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import MissingExtraError, MissingPathError, RecordError
+from tautscope.runs.array_files import read_arrays, with_single_numbers
 from tautscope.runs.table_text import NO_VALUE, split_table
 from tautscope.runs.units import check_unit, split_unit
 
@@ -38,7 +39,7 @@ class Table:
         columns: Name as asked for -> (n,) values; NaN where there is none. Times of day and dates
             are seconds since the first one.
         units: Name as asked for -> unit of the header or the line of units, if there is one.
-        rows: (n,) line of the file, from 1 on; of Parquet the row, from 1 on.
+        rows: (n,) line of a CSV file, from 1 on; of other files the row, from 1 on.
     """
 
     columns: dict[str, Floats]
@@ -52,7 +53,7 @@ class Sheet:
 
     Attributes:
         file: Its name, for errors.
-        frame: Columns of text, or of Parquet as they are, in the order of the file.
+        frame: Columns of text, or of Parquet and arrays as they are, in the order of the file.
         titles: Of the columns; their numbers if there is no title row.
         groups: Titles above the titles, or none.
         units: Of a line of units, or none.
@@ -112,10 +113,11 @@ class Sheet:
 
 
 def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "record") -> Table:
-    """Read columns of a CSV or Parquet file.
+    """Read columns of a CSV, Parquet, .npz or .mat file.
 
     A column is found by its title, or by its title without the unit in brackets or after the last
-    underscore: ``tip``, ``tip [mm]``, ``tip (mm)``, ``tip_mm``; or by its number, from 1 on.
+    underscore: ``tip``, ``tip [mm]``, ``tip (mm)``, ``tip_mm``; or by its number, from 1 on. Of a
+    column with several numbers in each row they are ``tip.1``, ``tip.2``, ...
 
     Args:
         path: The file; ``-`` is standard input.
@@ -132,7 +134,7 @@ def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "rec
 
 
 def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
-    """Open a CSV or Parquet file, see `read_table`."""
+    """Open a file, see `read_table`."""
     if find_spec("polars") is None:
         raise MissingExtraError("reading a table", ("polars",), ("analysis",))
     import polars as pl  # noqa: PLC0415  takes 0.3 s
@@ -140,10 +142,13 @@ def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
     file = "standard input" if str(path) == STDIN else str(path)
     data = _bytes(path, what)
     is_parquet = data.startswith(b"PAR1")
-    text = None if is_parquet else split_table(data, file)
+    arrays = read_arrays(data, file)
+    text = None if is_parquet or arrays else split_table(data, file)
     try:
-        if text is None:
-            frame = pl.read_parquet(io.BytesIO(data))
+        if arrays:
+            frame = pl.DataFrame(arrays)
+        elif text is None:
+            frame = with_single_numbers(pl.read_parquet(io.BytesIO(data)))
         else:
             numbers = text.delimiter.join(map(str, range(text.width))).encode()
             frame = pl.read_csv(
@@ -176,7 +181,7 @@ def _bytes(path: str | PathLike[str], what: str) -> bytes:
     try:
         return Path(path).read_bytes()
     except (FileNotFoundError, IsADirectoryError):
-        allowed = "a CSV file with a header line, or a Parquet file"
+        allowed = "a CSV file with a header line, or a Parquet, .npz or .mat file"
         raise MissingPathError(what, str(path), allowed) from None
 
 

@@ -1,0 +1,110 @@
+"""Arrays of NumPy and MATLAB files as columns, and columns with several numbers in a row."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.errors import MissingExtraError, RecordError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Arrays = dict[str, NDArray[Any]]
+
+_MAT, _MAT_73, _ZIP = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"PK\x03\x04"
+
+
+def read_arrays(data: bytes, file: str) -> Arrays | None:
+    """The columns of a .npz or .mat file, by name; None for another file.
+
+    The samples are along the axis of the most frequent length; arrays of another length are left
+    out. An array of several columns has the names NAME.1, NAME.2, ... A field of a MATLAB struct is
+    NAME.FIELD.
+
+    Raises:
+        MissingExtraError: SciPy is not installed.
+        RecordError: It has no arrays of numbers, or is a kind of file that is not read.
+    """
+    if data.startswith(_MAT_73):
+        raise RecordError(file, "a .mat file of version 7.3", "version 7: save('-v7', ...)")
+    if data.startswith(_MAT):
+        found = _from_matlab(data, file)
+    elif data.startswith(_ZIP):
+        found = _from_numpy(data, file)
+    else:
+        return None
+    arrays = {name: each for name, each in found.items() if each.ndim in (1, 2) and each.size > 1}
+    if not arrays:
+        raise RecordError(file, "no array of numbers", "arrays with a number for each sample")
+    lengths = Counter(length for each in arrays.values() for length in set(each.shape) - {1})
+    count = max(lengths, key=lambda length: (lengths[length], length))
+    return dict(_columns(arrays, count))
+
+
+def _columns(arrays: Arrays, count: int) -> Iterator[tuple[str, NDArray[Any]]]:
+    for name, array in arrays.items():
+        if array.shape[0] == count:
+            table = array.reshape(count, -1)
+        elif array.shape[-1] == count:
+            table = array.T
+        else:
+            continue
+        for number, column in enumerate(table.T, 1):
+            yield (
+                (name if table.shape[1] == 1 else f"{name}.{number}"),
+                np.ascontiguousarray(column),
+            )
+
+
+def _from_numpy(data: bytes, file: str) -> Arrays:
+    if b"[Content_Types].xml" in data:
+        raise RecordError(file, "a spreadsheet", "a CSV file: save the sheet as CSV")
+    try:
+        with np.load(io.BytesIO(data)) as archive:
+            return {name: archive[name] for name in archive if archive[name].dtype.kind in "fiub"}
+    except Exception as error:
+        raise RecordError(file, _first_line(error), "a .npz file of numbers") from None
+
+
+def _from_matlab(data: bytes, file: str) -> Arrays:
+    """In a process of its own: SciPy's reader may crash it on a damaged file."""
+    if find_spec("scipy") is None:
+        raise MissingExtraError("reading a .mat file", ("scipy",), ("analysis",))
+    command = [sys.executable, "-m", "tautscope.runs.matlab_file"]
+    done = subprocess.run(command, input=data, capture_output=True, check=False)
+    if done.returncode != 0:
+        said = done.stderr.decode(errors="replace").splitlines()
+        reason = said[-1] if done.returncode == 1 and said else "a damaged file"
+        raise RecordError(file, reason, "a .mat file of numbers")
+    return _from_numpy(done.stdout, file)
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)
+
+
+def with_single_numbers(frame: pl.DataFrame) -> pl.DataFrame:
+    """A table in which each column with lists of numbers has become columns NAME.1, NAME.2, ..."""
+    import polars as pl  # noqa: PLC0415
+
+    columns: list[pl.Series] = []
+    for column in frame:
+        if not isinstance(column.dtype, pl.List | pl.Array):
+            columns.append(column)
+            continue
+        lists = column.cast(pl.List(column.dtype.inner))
+        width = int(lists.list.len().max() or 0)  # type: ignore[arg-type]
+        columns += [
+            lists.list.get(k, null_on_oob=True).alias(f"{column.name}.{k + 1}")
+            for k in range(width)
+        ]
+    return pl.DataFrame(columns)
