@@ -28,4 +28,4 @@ if __name__ == "__main__":
         )
     except Exception as error:  # of any kind, for a damaged file
         raise SystemExit(f"{type(error).__name__}: {error}") from None
-    np.savez(sys.stdout.buffer, **arrays)
+    np.savez(sys.stdout.buffer, **arrays)  # type: ignore[arg-type]
