@@ -13,14 +13,16 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """Yield a function to call with the share of work done, 0 to 1."""
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),
     )
-    is_hidden = not sys.stderr.isatty()
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=is_hidden) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share: bar.update(task, completed=share)
