@@ -112,27 +112,33 @@ def beyond(rows: Sequence[Row]) -> str:
 
 
 def off_table(found: dict[str, Sequence[Row]]) -> str:
-    """Return the table of detectors that were switched off."""
+    """Return the table of detectors that were switched off, and which no run needs."""
     lines = [
-        "| detector off | N | runs repeated | worst, transient [mm] | worst, permanent [mm] "
-        "| k beyond 3 mm, transient | SILENT | worst kinds |",
-        "|---|---|---|---|---|---|---|---|",
+        "| detector off | runs repeated | worst, transient [mm] | worst, permanent [mm] "
+        "| transient, beyond 3 mm | SILENT | worst kinds |",
+        "|---|--:|--:|--:|--:|--:|---|",
     ]
+    unused = []
     for name, rows in found.items():
+        repeated = sum(name in row["raised"] for row in rows)
+        if not repeated:
+            unused.append(f"`{name}`")
+            continue
         transient, permanent = by_duration(rows)
         worst = sorted(transient, key=lambda row: -row["excursion"][0])
         cells = [
             name,
-            len(rows),
-            sum(name in row["raised"] for row in rows),
+            repeated,
             f"{_worst(transient):.2f}",
             f"{_worst(permanent):.2f}",
-            sum(row["excursion"][0] > DETECTOR_OFF_GOAL for row in transient),
-            sum(row["ending"] == "SILENT" for row in rows),
-            ", ".join(list(dict.fromkeys(row["kind"] for row in worst[:10]))[:3]),
+            sum(row["excursion"][0] > DETECTOR_OFF_GOAL for row in transient) or "",
+            sum(row["ending"] == "SILENT" for row in rows) or "",
+            ", ".join(list(dict.fromkeys(row["kind"] for row in worst[:10]))[:2]),
         ]
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
-    return "\n".join(lines)
+    number = len(next(iter(found.values())))
+    none = f" No run raises {', '.join(unused)}." if unused else ""
+    return f"{number} runs each.{none}\n\n" + "\n".join(lines)
 
 
 def _worst(rows: Iterable[Row]) -> float:
