@@ -57,10 +57,12 @@ def settle(*stations: LocalBus) -> None:
                 assert time.monotonic() < deadline
                 sender.send(can.Message(arbitration_id=number, is_extended_id=False))
                 received = other.recv(0.1)
-    stations[0].send(can.Message(arbitration_id=0x7FF, is_extended_id=False))
-    stations[1].send(can.Message(arbitration_id=0x7FE, is_extended_id=False))
+    # A station's last frame: what it repeated above has arrived before.
     for number, station in enumerate(stations):
-        ends = {0x7FF, 0x7FE} - {0x7FF - number}
+        station.send(can.Message(arbitration_id=0x7FF - number, is_extended_id=False))
+    marks = {0x7FF - number for number in range(len(stations))}
+    for number, station in enumerate(stations):
+        ends = marks - {0x7FF - number}
         while ends:
             received = station.recv(TIMEOUT)
             assert received is not None
