@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench.can_bus import Hub, LocalBus
-from tautscope.bench.drives import OnSync, SimulatedDrives
+from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
+from tautscope.bench.motors import OnCycle
 from tautscope.bench.requests import read_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
@@ -33,7 +34,7 @@ Motors = SimulatedDrives | SimulatedServos | SimulatedMicrocontroller
 def make_motors(
     config: DrivesConfig,
     resources: ExitStack,
-    on_cycle: OnSync | None = None,
+    on_cycle: OnCycle | None = None,
     *,
     start: NDArray[np.float64],
     modes: tuple[int, ...] = (7, 8),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Literal, get_args
 
 import can
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
-from tautscope.bench.motors import SimulatedMotors
+from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.hardware.cia402 import State
@@ -26,10 +26,6 @@ FaultKind = Literal["drop", "delay", "fault", "freeze", "heartbeat", "refuse"]
 """drop: neither sends nor receives. delay: sends late. fault: emergency object and fault state.
 freeze: the position does not change. heartbeat: sends no heartbeats. refuse: accepts no mode of
 operation."""
-
-OnSync = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""The plant: position demand values (3,) [m, rad, rad] to positions; called once per SYNC, after
-the TxPDOs are sent."""
 
 
 class SimulatedDrives(SimulatedMotors[FaultKind]):
@@ -48,7 +44,7 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
         self,
         bus: can.BusABC,
         config: DrivesConfig,
-        on_sync: OnSync | None = None,
+        on_sync: OnCycle | None = None,
         *,
         start: NDArray[np.float64] | None = None,
         modes: tuple[int, ...] = (7, 8),

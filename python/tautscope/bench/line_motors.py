@@ -15,18 +15,15 @@ import select
 import time
 import tty
 from abc import abstractmethod
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.bench.motors import Kind, SimulatedMotors
+from tautscope.bench.motors import Kind, OnCycle, SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.errors import ConfigError
 
-OnCycle = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""The plant: demanded positions (3,) [m, rad, rad] to positions; called once per period."""
 _IDLE = 0.005
 """How often the line is looked at while no client has it open [s]."""
 

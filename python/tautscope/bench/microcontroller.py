@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.bench.line_motors import LineMotors, OnCycle
+from tautscope.bench.line_motors import LineMotors
+from tautscope.bench.motors import OnCycle
 from tautscope.bench.serial_board import SerialBoard
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof

@@ -9,11 +9,17 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, Self, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tautscope.bench.events import Event
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 Kind = TypeVar("Kind", bound=str)
+OnCycle = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""The plant: demanded positions (3,) [m, rad, rad] to positions; called once per cycle of the
+client (on CAN per SYNC, after the TxPDOs are sent), and by the clock where none cycles."""
 
 
 class SimulatedMotors(ABC, Generic[Kind]):

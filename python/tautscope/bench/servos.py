@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench import servo_packets as packets
-from tautscope.bench.line_motors import LineMotors, OnCycle
+from tautscope.bench.line_motors import LineMotors
+from tautscope.bench.motors import OnCycle
 from tautscope.bench.servo import (
     CHECKSUM,
     DATA_LENGTH,
