@@ -21,7 +21,7 @@ DURATION = 4.0
 LARGEST = (2e-3, 0.2, 0.2)
 """Largest distance of a first test of the article's DOFs [m, rad, rad]."""
 _RESTS = ((0.0, 0.1), (0.45, 0.55), (0.9, 1.0))
-"""Parts of the motion of a rig in which it rests: at its start, out and back [share of it]."""
+"""Parts of the motion in which it rests: at its start, out and back [share of it]."""
 
 
 def check_distance(dof: NamedDof, distance: float) -> None:
@@ -37,7 +37,7 @@ def check_distance(dof: NamedDof, distance: float) -> None:
 
 
 def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
-    """Move a motor along a raised cosine by `distance` [m or rad] and back.
+    """Move a motor along raised cosines by `distance` [m or rad] and back, with `_RESTS`.
 
     THE MOTOR MOVES. It is quick-stopped at the end, and on every error.
 
@@ -56,9 +56,10 @@ def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
         try:
             for step in range(steps + 1):
                 command = begin.copy()
-                command[dof] += distance * _raised(step / steps)
+                command[dof] += distance * _displacement(step / steps)
                 applied.append(drives.exchange(command))
-                due += config.cycle
+                # After a pause of this process no set-points in a burst.
+                due = max(due + config.cycle, time.monotonic())
                 time.sleep(max(0.0, due - time.monotonic()))
         except TautscopeError as error:
             error.exit_status = STOPPED
@@ -119,8 +120,7 @@ def jog_rig(
         measured: dict[int, list[tuple[float, Measurement]]] = {}
         for step in range(steps + 1):
             command = begin.copy()
-            phase = np.interp(step / steps, np.ravel(_RESTS), (0.0, 0.0, 0.5, 0.5, 1.0, 1.0))
-            command[index] += distance * _raised(float(phase))
+            command[index] += distance * _displacement(step / steps)
             sample = check_sample(rig.step(command), config)
             applied.append(sample.applied[index] - begin[index])
             for each in sample.measurements:
@@ -154,6 +154,7 @@ def _seen(
     return SensorMotion(sensor, "points", moved, ended, "px", 1.0)
 
 
-def _raised(share: float) -> float:
-    """A raised cosine: 0 at both ends, 1 in the middle."""
-    return float((1 - np.cos(2 * np.pi * share)) / 2)
+def _displacement(share: float) -> float:
+    """Displacement at a share of the motion: raised cosines from 0 to 1 and back, with `_RESTS`."""
+    phase = np.interp(share, np.ravel(_RESTS), (0.0, 0.0, 0.5, 0.5, 1.0, 1.0))
+    return float((1 - np.cos(2 * np.pi * phase)) / 2)
