@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tautscope.config.servos import LAG, PORTS
-from tautscope.dof import Dof
+from tautscope.config.servos import LAG, PORTS, with_motor_defaults
 
 PROTOCOL = "serial"
 """``drives.protocol`` of the serial line protocol, docs/serial.md."""
@@ -24,14 +23,13 @@ def with_microcontroller_defaults(drives: dict[str, Any]) -> dict[str, Any]:
     if drives.get("protocol") != PROTOCOL:
         return drives
     filled = {"channel": SERIAL_PORTS[PROTOCOL], "bitrate": _BITRATE, "lag": LAG, **drives}
-    for dof in Dof:
-        axis = drives.get(dof.label)
-        if not isinstance(axis, dict):
-            continue
-        defaults: dict[str, Any] = {"sign": 1}
-        match axis.get("travel"):
-            case [float() | int() as lower, float() | int() as upper] if lower < upper:
-                error = _FOLLOWING_SHARE * (upper - lower)
-                defaults |= {"following_error": error, "following_window": error / 2}
-        filled[dof.label] = defaults | axis
-    return filled
+    return with_motor_defaults(filled, _with_defaults)
+
+
+def _with_defaults(_: str, axis: dict[str, Any]) -> dict[str, Any]:
+    defaults: dict[str, Any] = {"sign": 1}
+    match axis.get("travel"):
+        case [float() | int() as lower, float() | int() as upper] if lower < upper:
+            error = _FOLLOWING_SHARE * (upper - lower)
+            defaults |= {"following_error": error, "following_window": error / 2}
+    return defaults | axis

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import field
 
-from tautscope.config.actuators import ActuatorsConfig, check_actuators
+from tautscope.config.actuators import ActuatorsConfig, check_actuators, check_motors
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
@@ -91,7 +91,9 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         check_ranges(self)
         check_topics(self.dof, self.kinematics, self.measurement)
         if self.actuators is not None:
-            check_actuators(self.actuators, self.dof, self.drives)
+            check_actuators(self.actuators, self.dof)
+        if self.drives is not None:
+            check_motors(self.drives, self.actuators, self.dof)
 
     @property
     def dofs(self) -> tuple[NamedDof, ...]:
