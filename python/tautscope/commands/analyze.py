@@ -37,7 +37,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         extras=["analysis"],
     )
     analyze.add_argument(
-        "file", metavar="FILE", help="CSV, Parquet, .npz or .mat; - reads standard input"
+        "file",
+        metavar="FILE",
+        help="CSV, Parquet, .npz, .mat or ROS 2 bag; - reads standard input",
     )
     analyze.add_argument(
         "--command",
