@@ -74,3 +74,10 @@ def test_tables_with_poses_have_turn_and_travel(ending: str, tmp_path: Path) -> 
     _, pairs = list_columns(open_table(file))
     assert pairs[0][0] == "motor"
     assert not {("tip_x", "tip_travel"), ("tip_travel", "tip_x")} & set(pairs)
+
+
+def test_pairs_are_proposed_for_numbers_of_any_size(tmp_path: Path) -> None:
+    time = np.linspace(0, 20, 100)
+    frame = pl.DataFrame({"a": 1e-300 * np.sin(time), "b": 1e90 * np.sin(time - 0.2)})
+    frame.write_csv(tmp_path / "record.csv")
+    assert list_columns(open_table(tmp_path / "record.csv"))[1] == [("a", "b")]

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_ALLOWED = "a finite number, or blank or NaN for none"
+LARGEST = 1e100
+"""Largest number: the sum of the squares of larger ones may overflow."""
+_ALLOWED = f"a number up to {LARGEST:g}, or blank or NaN for none"
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
 _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 
@@ -31,7 +33,7 @@ def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np
         is_bad = values.is_null() & ~text.str.to_lowercase().is_in(NO_VALUE).fill_null(True)
         if is_bad.any() and not values.is_finite().any() and (times := _times(text)) is not None:
             return _seconds(times)
-        is_bad = is_bad | values.is_infinite().fill_null(False)
+        is_bad = is_bad | _is_too_large(values)
         if is_bad.any():
             index = int(is_bad.arg_max() or 0)
             where = f"{file}, {line} {rows[index]}, column {name}"
@@ -42,11 +44,17 @@ def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np
     if not (series.dtype.is_numeric() or series.dtype == pl.Boolean):
         raise RecordError(f"{file}, column {name}", str(series.dtype), "numbers")
     values = series.cast(pl.Float64)
-    if values.is_infinite().any():
-        index = int(values.is_infinite().arg_max() or 0)
+    is_bad = _is_too_large(values)
+    if is_bad.any():
+        index = int(is_bad.arg_max() or 0)
         where = f"{file}, {line} {rows[index]}, column {name}"
         raise RecordError(where, values[index], _ALLOWED)
     return values.fill_null(float("nan")).to_numpy().astype(np.float64)
+
+
+def _is_too_large(values: pl.Series) -> pl.Series:
+    """Infinities, too; but not NaN, which Polars orders above all numbers."""
+    return ((values.abs() > LARGEST) & values.is_not_nan()).fill_null(False)
 
 
 def _with_decimal_point(text: pl.Series) -> pl.Series:

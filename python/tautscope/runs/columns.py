@@ -116,7 +116,18 @@ def _rank(name: str) -> int:
 
 def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
     named = 1.0 if {_rank(one), _rank(other)} == {-1, 1} else 0.0
-    return named + abs(float(np.corrcoef(values[one], values[other])[0, 1]))
+    a, b = (_unit(values[name]) for name in (one, other))
+    return named + abs(float(a @ b))
+
+
+def _unit(values: Floats) -> Floats:
+    """Deviations from the mean, of length 1; 0 if there are none. Of numbers of any size."""
+    centred = values - values.mean()
+    size = float(np.max(np.abs(centred)))
+    if size == 0:
+        return centred
+    centred = centred / size
+    return np.asarray(centred / np.linalg.norm(centred))
 
 
 def _ordered(one: str, other: str, values: dict[str, Floats]) -> tuple[str, str]:

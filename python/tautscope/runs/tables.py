@@ -195,6 +195,9 @@ def _open(path: str | PathLike[str], what: str) -> Sheet:
             frame = pl.DataFrame(arrays)
         elif text is None:
             frame = with_single_numbers(pl.read_parquet(io.BytesIO(data)))
+            if "episode_index" in frame.columns and frame["episode_index"].n_unique() > 1:
+                count = f"{frame['episode_index'].n_unique()} episodes"
+                raise RecordError(file, count, "one: give the data set's folder")
         else:
             head = text.delimiter.join(map(str, range(text.width))).encode()
             frame = pl.read_csv(
