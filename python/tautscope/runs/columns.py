@@ -122,7 +122,7 @@ def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
 
 def _unit(values: Floats) -> Floats:
     """Deviations from the mean, of length 1; 0 if there are none. Of numbers of any size."""
-    centred = values - values.mean()
+    centred = np.asarray(values - values.mean())
     size = float(np.max(np.abs(centred)))
     if size == 0:
         return centred
