@@ -101,7 +101,7 @@ PURPOSE = {
     "rustypot": "packets of Dynamixel and Feetech servos",
     "dask": "benchmarks on a cluster",
     "eclipse-zenoh": "messages of ROS 2, in the process of the loop",
-    "rosbags": "types, hashes and CDR of ROS 2",
+    "rosbags": "types, hashes and CDR of ROS 2; bags",
     "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""

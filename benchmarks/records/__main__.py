@@ -2,8 +2,8 @@
 
 Records of real tools (TAUTSCOPE_DATA), and synthetic families; the loop's own filter by itself on
 the records of real tools and of a real continuum robot (`--only loop`); and the compensator that
-`analyze` writes, on the other half of its record (`--only compensator`). `--write` updates
-docs/models.md.
+`analyze` writes, on the other half of its record (`--only compensator`); and the time that the
+episodes of a data set take (`--only episodes`). `--write` updates docs/models.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
-from records import compensator, loop
+from records import compensator, lerobot, loop
 from records.evaluation import Job, Result, evaluate
 from records.families import FAMILIES
 from records.tools import SPLICED, tools
@@ -149,7 +149,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=SEEDS, help="per family [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
     parser.add_argument(
-        "--only", choices=["tools", "families", "loop", "compensator"], help="[all]"
+        "--only",
+        choices=["tools", "families", "loop", "compensator", "episodes"],
+        help="[all but episodes]",
     )
     parser.add_argument(
         "--baseline",
@@ -172,6 +174,9 @@ def arguments() -> argparse.Namespace:
 
 def main() -> None:
     options = arguments()
+    if options.only == "episodes":
+        print(lerobot.measure())
+        return
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     rows: list[dict[str, Any]] = []
     parts: list[tuple[str, str]] = []

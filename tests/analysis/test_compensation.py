@@ -1,5 +1,6 @@
 """What the verdict says that the loop would do, and its figure."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,3 +60,16 @@ def test_the_figure_marks_the_width_only_where_it_is_identified() -> None:
     assert [line.get_label() for line in time.lines] == ["measured", "predicted"]
     for kind in ("linear", "random walk"):
         assert not slide(judged(kind, 1)).axes[0].texts
+
+
+@pytest.mark.parametrize(("unit", "size"), [("", 1e4), ("m", 1e3), ("rad", 1e3), ("px", 1e-4)])
+def test_the_size_of_the_numbers_does_not_matter(unit: str, size: float) -> None:
+    """As of a tip in counts of an encoder, or in mm under a title with m."""
+    record = simulate("play", 3).record
+    units = ("", unit)
+    plain = judge(record).compensation
+    scaled = judge(replace(record, measured=size * record.measured, units=units)).compensation
+    assert plain is not None
+    assert scaled is not None
+    assert scaled.before == pytest.approx(size * plain.before, rel=1e-3)
+    assert scaled.after == pytest.approx(size * plain.after, rel=0.05)

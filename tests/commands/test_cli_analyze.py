@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bag_files import START, joint_state, pose_stamped, write_bag
 from play_model import play
 from refused import failed
 from tautscope import figure_style
@@ -279,3 +280,25 @@ def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_
     file.write_text("c,m\n" + "".join(f"{c},7\n" for c in range(9)))
     assert "measured: got '7 throughout the first half'" in failed(capsys, *arguments, "m", *out)
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_bag_is_listed_and_analysed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    time = np.arange(3000) * 0.02
+    motor = 15 * np.sin(2 * np.pi * time / 10)
+    stamps = [START + round(1e9 * each) for each in time]
+    topics = {
+        "/motor": [(t, joint_state(t, {"m": c})) for t, c in zip(stamps, motor, strict=True)],
+        "/tip": [
+            (t, pose_stamped(t, (1e-3 * y, 0, 0)))
+            for t, y in zip(stamps, play(motor, -3.0, 5.0), strict=True)
+        ],
+    }
+    bag = str(write_bag(tmp_path / "bag", "mcap", topics))
+    assert main(["analyze", bag]) == 0
+    command = "--command /motor/m/position --measured /tip/pose/position/x"
+    assert f"analyze {bag} {command}" in capsys.readouterr().out
+    out = ["--json", "--out", str(tmp_path / "out")]
+    assert main(["analyze", bag, *command.split(), *out]) == 0
+    [dof] = json.loads(capsys.readouterr().out)["dofs"]
+    assert dof["width"] == pytest.approx(8e-3, rel=0.02)
+    assert "metadata.yaml: got 'no such file'" in failed(capsys, "analyze", str(tmp_path))

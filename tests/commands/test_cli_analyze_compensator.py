@@ -112,7 +112,9 @@ def test_the_compensator_names_what_the_record_does_not_know(tmp_path: Path) -> 
         assert main(["analyze", str(file), *columns]) == 0
     texts = [(tmp_path / name / "compensator.toml").read_text() for name in ("a", "b")]
     for text in texts:
-        assert "names no length or angle as the tip's unit: 0.001 m is 1 of axis_1" in text
+        assert (
+            "names no plausible length or angle as the tip's unit: 0.001 m is 1 of axis_1" in text
+        )
     assert "The record has no time: set speed" in texts[0]
     assert "measurement.delays, if time stamps are those of the record [s]: axis_1 0." in texts[1]
     untimed, timed = (load_config(tmp_path / name / "compensator.toml") for name in ("a", "b"))

@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 from tautscope.errors import FieldError, MissingExtraError, RecordError
 from tautscope.replay import read_motors, read_record
+from tautscope.runs.tables import open_table, read_table
 from tautscope.runs.units import parse_units, split_unit
 
 DIALECTS = {
@@ -205,3 +206,16 @@ def test_implausible_times_of_motors_are_refused(tmp_path: Path) -> None:
     file.write_text("time,insertion,rotation,bending\n0,0,0,0\n0,0,0,0\n1,0,0,0\n")
     with pytest.raises(RecordError, match="0 again, as in 2 lines of 3"):
         read_motors(file)
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_numbers_whose_squares_overflow_are_refused(ending: str, tmp_path: Path) -> None:
+    """And are left out of the columns of the pose that they are in."""
+    file = tmp_path / f"log.{ending}"
+    columns = {"motor": [1.0, 2.0, 3.0], "tip_x": [0.5, 1e308, 3.0]}
+    frame = pl.DataFrame(columns | {"tip_y": [0.0] * 3, "tip_z": [1.0, None, 2.0]})
+    getattr(frame, f"write_{ending}")(file)
+    assert "tip_travel" not in open_table(file).titles
+    with pytest.raises(RecordError, match=r"[23], column tip_x: got .*1e\+?308.*up to 1e\+100"):
+        read_table(file, ["tip_x"])
+    assert np.isnan(read_table(file, ["tip_z"]).columns["tip_z"]).tolist() == [False, True, False]

@@ -105,7 +105,7 @@ def run(
     """
     config = from_document(settings)
     actuators, loop = Actuators(config), HysteresisReduction(config)
-    time, scale = record.clock, scale_of(record.units[1])
+    time, scale = record.clock, scale_of(record)
     ticks = np.arange(0, time[-1], PERIOD)
     motors = np.interp(ticks, time, record.command)
     reference = np.array([actuators.dofs([each]) for each in motors.tolist()])

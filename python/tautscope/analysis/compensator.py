@@ -17,7 +17,9 @@ MARGIN, REACH, HASTE = 1.5, 1.0, 2.0
 """Width that is compensated over the one found; travel beyond that of the record, in widths; and
 speed that is followed over that of the record."""
 UNNAMED = 1e-3
-"""Metres per unit of a tip whose unit the file does not name."""
+"""Metres per unit of a tip whose unit the file does not name, or a thousandth of it, and so on."""
+_LARGEST = {"m": 1.0, "rad": 100.0, "": 0.1}
+"""Largest motion of a tip in its unit [m or rad]: one that is larger is in another unit."""
 PROGRAM = '''"""Run compensator.toml on plays; PlayRig stands for your motors and sensor."""
 
 from pathlib import Path
@@ -41,9 +43,15 @@ for compensate in (False, True):
 '''
 
 
-def scale_of(unit: str) -> float:
+def scale_of(record: Record) -> float:
     """Metres or radians per unit of a tip."""
-    return LENGTHS.get(unit) or ANGLES.get(unit) or UNNAMED
+    unit = record.units[1]
+    kind = "m" if unit in LENGTHS else "rad" if unit in ANGLES else ""
+    scale = LENGTHS.get(unit) or ANGLES.get(unit) or UNNAMED
+    extent = float(np.nanmax(record.measured) - np.nanmin(record.measured))
+    while scale * extent > _LARGEST[kind]:
+        scale *= UNNAMED
+    return scale
 
 
 def late_by(record: Record, found: Identification) -> float:
@@ -67,7 +75,7 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     dofs, noises, delays = [], [], []
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
-        scale = scale_of(record.units[1])
+        scale = scale_of(record)
         width = scale * found.width.value
         path = scale * (found.gain * record.command + found.offset)
         low, high = float(path.min()) - REACH * width, float(path.max()) + REACH * width
@@ -106,10 +114,11 @@ def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
         "[[dof]] is in m or rad, with the tip's zero; [actuators] has the motors of the record.",
         "range: motion of the record and one slack more to both sides. May your motors go there?",
     ]
-    unnamed = [name for name, (record, _) in parts.items() if not _is_known(record.units[1])]
-    if unnamed:
-        what = "the file names no length or angle as the tip's unit: 0.001 m is 1 of"
-        found.append(f"{what} {', '.join(unnamed)}")
+    for name, (record, _) in parts.items():
+        unit, scale = record.units[1], scale_of(record)
+        if scale != (LENGTHS.get(unit) or ANGLES.get(unit)):
+            what = "the file names no plausible length or angle as the tip's unit"
+            found.append(f"{what}: {scale:g} {'rad' if unit in ANGLES else 'm'} is 1 of {name}")
     untimed = [name for name, (record, _) in parts.items() if not record.is_timed]
     if untimed:
         found.append("The record has no time: set speed, and measurement.delays in s.")
@@ -132,10 +141,6 @@ def write_compensator(
     (folder / "compensator.toml").write_text(text, encoding="utf-8")
     (folder / "compensator.py").write_text(PROGRAM, encoding="utf-8")
     return document
-
-
-def _is_known(unit: str) -> bool:
-    return unit in LENGTHS or unit in ANGLES
 
 
 def _rounded(value: Any) -> Any:

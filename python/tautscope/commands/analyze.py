@@ -7,15 +7,17 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tautscope.commands import arguments
+from tautscope.commands import analyze_episodes, arguments
 from tautscope.commands.analyze_output import print_columns, print_results, results_to_json
 from tautscope.commands.printing import print_json
 from tautscope.config import load_config
-from tautscope.errors import RecordError
+from tautscope.errors import FieldError, RecordError
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
     from tautscope.analysis.verdict import Verdict
+    from tautscope.runs.episodes import Episode
+    from tautscope.runs.tables import Sheet
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -37,7 +39,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         extras=["analysis"],
     )
     analyze.add_argument(
-        "file", metavar="FILE", help="CSV, Parquet, .npz or .mat; - reads standard input"
+        "file",
+        metavar="FILE",
+        help="CSV, Parquet, .npz, .mat, ROS 2 bag, or folder of a LeRobot data set; - reads "
+        "standard input",
     )
     analyze.add_argument(
         "--command",
@@ -89,6 +94,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         action="store_true",
         help="exit status 1 if the compensator would not help in each degree of freedom",
     )
+    analyze_episodes.add_arguments(analyze)
     arguments.add_out(analyze, "analyze")
     arguments.add_config(analyze)
     arguments.add_json(analyze)
@@ -97,10 +103,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.analysis.output import write_results  # noqa: PLC0415
     from tautscope.runs.columns import list_columns  # noqa: PLC0415
-    from tautscope.runs.tables import open_table  # noqa: PLC0415
 
+    episodes, sheet = _open(options)
     if options.command is None and options.measured is None:
-        columns, pairs = list_columns(open_table(options.file))
+        columns, pairs = list_columns(sheet)
         print_columns(options.file, columns, pairs, is_json=options.json)
         return 0
     for name in ("command", "measured"):
@@ -111,8 +117,12 @@ def _run(options: argparse.Namespace) -> int:
             f"--command has {len(options.command)} columns, --measured {len(options.measured)}: "
             "one tip per actuator"
         )
+    if episodes and options.episode is None:
+        names = _names([sheet.titles[sheet.index(tip)] for tip in options.measured])
+        analyze_episodes.analyze_episodes(options, episodes, names)
+        return 0
     folder = arguments.out_folder(options)
-    results = _results(options)
+    results = _results(options, sheet)
     settings = write_results(results, folder)
     if options.json:
         print_json({"folder": str(folder), **results_to_json(results, settings)})
@@ -122,7 +132,25 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if helps or not options.check else 1
 
 
-def _results(options: argparse.Namespace) -> list[tuple[Verdict, Analysis]]:
+def _open(options: argparse.Namespace) -> tuple[list[Episode], Sheet]:
+    """The episodes of a data set, and the table of the first or the chosen one; or a table."""
+    from tautscope.runs.episodes import is_data_set, list_episodes, open_episode  # noqa: PLC0415
+    from tautscope.runs.tables import open_table  # noqa: PLC0415
+
+    if not is_data_set(options.file):
+        for name in ("episode", "workers"):
+            if getattr(options, name) is not None:
+                options.usage_error(f"--{name} is for the folder of a data set")
+        return [], open_table(options.file)
+    episodes = list_episodes(options.file)
+    chosen = [each for each in episodes if options.episode in (None, each.number)]
+    if not chosen:
+        allowed = f"one of {episodes[0].number} to {episodes[-1].number}"
+        raise FieldError("--episode", options.episode, allowed)
+    return episodes, open_episode(options.file, chosen[0])
+
+
+def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, Analysis]]:
     """Verdict and comparison of models per degree of freedom; the file is read once."""
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
     from tautscope.analysis.verdict import judge  # noqa: PLC0415
@@ -132,7 +160,6 @@ def _results(options: argparse.Namespace) -> list[tuple[Verdict, Analysis]]:
     from tautscope.runs.tables import open_table  # noqa: PLC0415
 
     config = load_config(options.config)
-    sheet = open_table(options.file)
     tips = sheet if options.tip_file is None else open_table(options.tip_file)
     time = options.time or time_column(sheet.titles)
     pairs = list(zip(options.command, options.measured, strict=True))

@@ -6,7 +6,7 @@ import io
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -92,8 +92,15 @@ def _first_line(error: Exception) -> str:
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 
-def with_single_numbers(frame: pl.DataFrame) -> pl.DataFrame:
-    """A table in which each column with lists of numbers has become columns NAME.1, NAME.2, ..."""
+def with_single_numbers(
+    frame: pl.DataFrame, names: Mapping[str, Sequence[str]] | None = None
+) -> pl.DataFrame:
+    """A table in which each column with lists of numbers has become columns NAME.1, NAME.2, ...
+
+    Args:
+        frame: The table.
+        names: NAME -> names of its numbers, in place of 1, 2, ... if they are as many and differ.
+    """
     import polars as pl  # noqa: PLC0415
 
     columns: list[pl.Series] = []
@@ -103,8 +110,10 @@ def with_single_numbers(frame: pl.DataFrame) -> pl.DataFrame:
             continue
         lists = column.cast(pl.List(column.dtype.inner))
         width = int(lists.list.len().max() or 0)  # type: ignore[arg-type]
+        given = (names or {}).get(column.name, ())
+        ends = given if len(set(given)) == len(given) == width else range(1, width + 1)
         columns += [
-            lists.list.get(k, null_on_oob=True).alias(f"{column.name}.{k + 1}")
-            for k in range(width)
+            lists.list.get(k, null_on_oob=True).alias(f"{column.name}.{end}")
+            for k, end in enumerate(ends)
         ]
     return pl.DataFrame(columns)

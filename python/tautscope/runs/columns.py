@@ -9,16 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import RecordError
+from tautscope.runs.axes import find_axes, title_of
 from tautscope.runs.tables import Sheet, filled
 from tautscope.runs.units import TIMES, split_unit
 
 Floats = NDArray[np.float64]
 
 _TIMES = {"time", "t", "timestamp", "stamp", "timestamps", "zeit", "datetime", "sec", "seconds"}
-_COMMANDS = ("motor", "command", "cmd", "servo", "actuator", "setpoint", "input", "encoder")
+_COMMANDS = (
+    "motor", "command", "cmd", "servo", "actuator", "setpoint", "input", "encoder", "joint",
+    "action",
+)  # fmt: skip
 _TIPS = ("tip", "measured", "tracker", "jaw", "output", "marker", "sensor", "aurora", "pose")
 LEAST_CORRELATION = 0.5
 MOST_PAIRS = 3
+_ENOUGH = 20_000
+"""Samples by which two columns are compared."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +80,32 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
         columns.append(found)
         is_counter = np.all(np.diff(seen) > 0)
         if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
-            moving[name] = filled(values)
+            moving[name] = filled(values)[:: -(-len(values) // _ENOUGH)]
+    own = _components(sheet.titles)
     pairs = [
         (strength, *_ordered(one, other, moving))
         for one, other in combinations(moving, 2)
+        if _parent(one) != _parent(other) and not {(one, other), (other, one)} & own
         if (strength := _strength(one, other, moving)) > LEAST_CORRELATION
     ]
     pairs.sort(key=lambda pair: -pair[0])
     return columns, [(command, tip) for _, command, tip in pairs[:MOST_PAIRS]]
+
+
+def _components(titles: list[str]) -> set[tuple[str, str]]:
+    """Each component of a pose with the column that was made from it."""
+    return {
+        (titles[k], made)
+        for prefix, columns in find_axes(titles)
+        for made in titles
+        if split_unit(made)[0] in (title_of(prefix, "turn"), title_of(prefix, "travel"))
+        for k in columns
+    }
+
+
+def _parent(title: str) -> str:
+    """/TOPIC/FIELD of a column of a bag, whose columns have one source; of others the title."""
+    return title.rpartition("/")[0] if title.startswith("/") else title
 
 
 def _rank(name: str) -> int:
@@ -92,7 +116,18 @@ def _rank(name: str) -> int:
 
 def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
     named = 1.0 if {_rank(one), _rank(other)} == {-1, 1} else 0.0
-    return named + abs(float(np.corrcoef(values[one], values[other])[0, 1]))
+    a, b = (_unit(values[name]) for name in (one, other))
+    return named + abs(float(a @ b))
+
+
+def _unit(values: Floats) -> Floats:
+    """Deviations from the mean, of length 1; 0 if there are none. Of numbers of any size."""
+    centred = np.asarray(values - values.mean())
+    size = float(np.max(np.abs(centred)))
+    if size == 0:
+        return centred
+    centred = centred / size
+    return np.asarray(centred / np.linalg.norm(centred))
 
 
 def _ordered(one: str, other: str, values: dict[str, Floats]) -> tuple[str, str]:

@@ -1,12 +1,12 @@
-"""Columns of recorded tables: CSV of any dialect, Parquet, arrays, standard input; with Polars."""
+"""Columns of recorded tables: CSV, Parquet, arrays, bags, standard input; with Polars."""
 
 from __future__ import annotations
 
 import io
+import re
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -16,8 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import MissingExtraError, MissingPathError, RecordError
+from tautscope.runs import bags
 from tautscope.runs.array_files import read_arrays, with_single_numbers
-from tautscope.runs.table_text import NO_VALUE, split_table
+from tautscope.runs.axes import find_axes, title_of, travel, turn
+from tautscope.runs.cells import numbers
+from tautscope.runs.table_text import split_table
 from tautscope.runs.units import check_unit, split_unit
 
 if TYPE_CHECKING:
@@ -26,9 +29,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 STDIN = "-"
-_ALLOWED = "a finite number, or blank or NaN for none"
-_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
-_CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
+_POINT = re.compile("/(position|translation|point)/[xyz]$")
+"""Columns of a bag in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,8 @@ class Sheet:
         groups: Titles above the titles, or none.
         units: Of a line of units, or none.
         rows: See `Table`.
-        line: What a row is called: "line" or "row".
+        line: What a row is called: "line", "row" or "message".
+        is_merged: Whether a row has values in the columns of one topic alone.
     """
 
     file: str
@@ -68,6 +71,7 @@ class Sheet:
     units: list[str]
     rows: NDArray[np.int64]
     line: str
+    is_merged: bool = False
 
     def read(self, names: Sequence[str]) -> Table:
         """The columns with these titles, see `read_table`."""
@@ -79,11 +83,17 @@ class Sheet:
             columns[name] = self.values(index, name)
             if unit := self.unit(index):
                 units[name] = unit
-        return Table(columns, units, self.rows)
+        if not self.is_merged:
+            return Table(columns, units, self.rows)
+        asked = [self.index(name) for name in names]
+        signals = [k for k in asked if self.titles[k] != bags.TIME] or asked
+        is_own = np.any([self.frame.to_series(k).is_not_null() for k in signals], axis=0)
+        kept = {name: values[is_own] for name, values in columns.items()}
+        return Table(kept, units, self.rows[is_own])
 
     def values(self, index: int, name: str) -> Floats:
         """(n,) numbers of a column."""
-        return _numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
+        return numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
 
     def unit(self, index: int) -> str:
         """Unit of a column, empty if the file does not name it."""
@@ -113,11 +123,14 @@ class Sheet:
 
 
 def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "record") -> Table:
-    """Read columns of a CSV, Parquet, .npz or .mat file.
+    """Read columns of a CSV, Parquet, .npz or .mat file, or of a ROS 2 bag.
 
     A column is found by its title, or by its title without the unit in brackets or after the last
     underscore: ``tip``, ``tip [mm]``, ``tip (mm)``, ``tip_mm``; or by its number, from 1 on. Of a
     column with several numbers in each row they are ``tip.1``, ``tip.2``, ...
+    Those of a bag are as in `tautscope.runs.bags.read_bag`. Of quaternions (``tip_qx`` to
+    ``tip_qw``) and points (``tip_x`` to ``tip_z``) there are also ``tip_q_turn`` and
+    ``tip_travel``, see `tautscope.runs.axes`.
 
     Args:
         path: The file; ``-`` is standard input.
@@ -134,12 +147,45 @@ def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "rec
 
 
 def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
-    """Open a file, see `read_table`."""
+    """Open a file or bag, see `read_table`."""
+    return with_axes(_open(path, what))
+
+
+def with_axes(sheet: Sheet) -> Sheet:
+    """A table with the turns of its quaternions and the travels of its points as columns."""
+    import polars as pl  # noqa: PLC0415
+
+    added: list[pl.Series] = []
+    for prefix, columns in find_axes(sheet.titles):
+        try:
+            values = np.stack([sheet.values(k, sheet.titles[k]) for k in columns], axis=1)
+        except RecordError:
+            continue
+        if len(columns) == 4:
+            title, found = f"{title_of(prefix, 'turn')} [rad]", turn(values)
+        else:
+            unit = sheet.unit(columns[0])
+            title, found = (
+                title_of(prefix, "travel") + (f" [{unit}]" if unit else ""),
+                travel(values),
+            )
+        if found is not None and title not in sheet.titles:
+            added.append(pl.Series(title, found, nan_to_null=True))
+    titles = [*sheet.titles, *(each.name for each in added)]
+    return replace(sheet, frame=sheet.frame.hstack(added), titles=titles)
+
+
+def _open(path: str | PathLike[str], what: str) -> Sheet:
     if find_spec("polars") is None:
         raise MissingExtraError("reading a table", ("polars",), ("analysis",))
     import polars as pl  # noqa: PLC0415  takes 0.3 s
 
     file = "standard input" if str(path) == STDIN else str(path)
+    if Path(path).is_dir() or (Path(path).suffix in bags.SUFFIXES and Path(path).is_file()):
+        frame = bags.read_bag(path)
+        units = ["s", *("m" if _POINT.search(title) else "" for title in frame.columns[1:])]
+        rows = np.arange(1, len(frame) + 1)
+        return Sheet(file, frame, frame.columns, [], units, rows, "message", is_merged=True)
     data = _bytes(path, what)
     is_parquet = data.startswith(b"PAR1")
     arrays = read_arrays(data, file)
@@ -149,10 +195,13 @@ def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
             frame = pl.DataFrame(arrays)
         elif text is None:
             frame = with_single_numbers(pl.read_parquet(io.BytesIO(data)))
+            if "episode_index" in frame.columns and frame["episode_index"].n_unique() > 1:
+                count = f"{frame['episode_index'].n_unique()} episodes"
+                raise RecordError(file, count, "one: give the data set's folder")
         else:
-            numbers = text.delimiter.join(map(str, range(text.width))).encode()
+            head = text.delimiter.join(map(str, range(text.width))).encode()
             frame = pl.read_csv(
-                numbers + b"\n" + text.data,
+                head + b"\n" + text.data,
                 separator=text.delimiter,
                 infer_schema=False,
                 truncate_ragged_lines=True,
@@ -180,80 +229,6 @@ def _bytes(path: str | PathLike[str], what: str) -> bytes:
         return sys.stdin.buffer.read()
     try:
         return Path(path).read_bytes()
-    except (FileNotFoundError, IsADirectoryError):
-        allowed = "a CSV file with a header line, or a Parquet, .npz or .mat file"
+    except FileNotFoundError:
+        allowed = "a CSV file with a header line, a Parquet, .npz or .mat file, or a ROS 2 bag"
         raise MissingPathError(what, str(path), allowed) from None
-
-
-def _numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]) -> Floats:
-    """A column as numbers; times become seconds since the first one."""
-    import polars as pl  # noqa: PLC0415
-
-    if series.dtype == pl.String:
-        text = series.str.strip_chars().str.strip_chars('"').str.strip_chars()
-        values = _with_decimal_point(text).cast(pl.Float64, strict=False)
-        is_bad = values.is_null() & ~text.str.to_lowercase().is_in(NO_VALUE).fill_null(True)
-        if is_bad.any() and not values.is_finite().any() and (times := _times(text)) is not None:
-            return _seconds(times)
-        is_bad = is_bad | values.is_infinite().fill_null(False)
-        if is_bad.any():
-            index = int(is_bad.arg_max() or 0)
-            where = f"{file}, {line} {rows[index]}, column {name}"
-            raise RecordError(where, text[index], _ALLOWED)
-        return values.fill_null(float("nan")).to_numpy().astype(np.float64)
-    if series.dtype.is_temporal():
-        return _seconds(series)
-    if not (series.dtype.is_numeric() or series.dtype == pl.Boolean):
-        raise RecordError(f"{file}, column {name}", str(series.dtype), "numbers")
-    values = series.cast(pl.Float64)
-    if values.is_infinite().any():
-        index = int(values.is_infinite().arg_max() or 0)
-        where = f"{file}, {line} {rows[index]}, column {name}"
-        raise RecordError(where, values[index], _ALLOWED)
-    return values.fill_null(float("nan")).to_numpy().astype(np.float64)
-
-
-def _with_decimal_point(text: pl.Series) -> pl.Series:
-    """Numbers with a decimal comma, also 1.234,5; unchanged if others have a point alone."""
-    has_comma = text.str.contains(",", literal=True).fill_null(False)
-    has_point = text.str.contains(".", literal=True).fill_null(False)
-    if not has_comma.any() or (has_point & ~has_comma).any():
-        return text
-    if text.str.contains(r",.*[.,]").fill_null(False).any():
-        return text
-    return text.str.replace_all(".", "", literal=True).str.replace(",", ".", literal=True)
-
-
-def _times(text: pl.Series) -> pl.Series | None:
-    """Texts as dates or times of day, ISO 8601 or as people write them; None if one is neither."""
-    import polars as pl  # noqa: PLC0415
-
-    plain = (
-        text.str.replace(",", ".", literal=True)
-        .str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
-        .str.replace("T", " ", literal=True)
-    )
-    given = text.is_not_null() & (text != "")
-    readers = [
-        partial(plain.str.strptime, pl.Datetime("ns"), f"{date} {clock}", strict=False)
-        for date in _DATES
-        for clock in _CLOCKS
-    ] + [partial(plain.str.strptime, pl.Time, clock, strict=False) for clock in _CLOCKS]
-    return next(
-        (found for read in readers if ((found := read()).is_not_null() == given).all()), None
-    )
-
-
-def _seconds(times: pl.Series) -> Floats:
-    """Seconds since the first time; NaN where there is none."""
-    import polars as pl  # noqa: PLC0415
-
-    if times.dtype == pl.Duration:
-        ticks = times.dt.total_nanoseconds()
-    elif times.dtype == pl.Time:
-        ticks = times.cast(pl.Int64)
-    else:
-        ticks = times.cast(pl.Datetime("ns")).cast(pl.Int64)
-    first = ticks.drop_nulls()
-    relative = ticks - (first[0] if len(first) else 0)
-    return (relative.cast(pl.Float64) / 1e9).fill_null(float("nan")).to_numpy().astype(np.float64)

@@ -1,0 +1,115 @@
+"""``tautscope analyze`` of a data set with many episodes."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import shlex
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
+from tautscope.runs.output_folder import new_folder
+
+if TYPE_CHECKING:
+    from tautscope.analysis.episodes import Summary
+    from tautscope.runs.episodes import Episode
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options for data sets."""
+    parser.add_argument(
+        "--episode",
+        type=arguments.natural,
+        metavar="N",
+        help="one episode of a data set, in full [the slack of all episodes]",
+    )
+    parser.add_argument(
+        "--workers",
+        type=arguments.positive,
+        metavar="N",
+        help="processes for the episodes of a data set [all cores]",
+    )
+
+
+def analyze_episodes(
+    options: argparse.Namespace, episodes: Sequence[Episode], names: Sequence[str]
+) -> None:
+    """Judge all episodes; write episodes.csv and episodes.png, and print what they say."""
+    import polars as pl  # noqa: PLC0415
+
+    from tautscope.analysis.episodes import (  # noqa: PLC0415
+        Request,
+        judge_all,
+        summarize,
+    )
+    from tautscope.analysis.episodes_figure import episodes_figure  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+
+    for name in ("tip_file", "update_distance", "gain", "check", "config"):
+        if getattr(options, name):
+            options.usage_error(f"--{name.replace('_', '-')} of a data set needs --episode")
+    folder = arguments.out_folder(options)
+    pairs = tuple(zip(options.command, options.measured, strict=True))
+    request = Request(options.file, pairs, tuple(names), options.time, tuple(options.missing))
+    workers = options.workers or os.cpu_count() or 1
+    rows: list[dict[str, Any]] = []
+    with progress_bar("episodes") as progress:
+        for done, each in enumerate(judge_all(episodes, request, workers), 1):
+            rows += each
+            progress(done / len(episodes))
+    with new_folder(folder) as place:
+        pl.DataFrame(rows, infer_schema_length=None).write_csv(place / "episodes.csv")
+        episodes_figure(rows, names).savefig(place / "episodes.png")
+    found = {name: summarize([row for row in rows if row["name"] == name]) for name in names}
+    if options.json:
+        dofs = [
+            {"name": name, "command": command, "measured": tip} | _to_json(found[name])
+            for name, (command, tip) in zip(names, pairs, strict=True)
+        ]
+        print_json({"folder": str(folder), "episodes": len(episodes), "dofs": dofs})
+        return
+    screen = console()
+    for name, (command, tip) in zip(names, pairs, strict=True):
+        text = f"{name}: {_text(found[name], len(episodes))}"
+        if found[name].typical is not None:
+            words = ["tautscope", "analyze", options.file, "--episode", str(found[name].typical)]
+            more = shlex.join([*words, "--command", command, "--measured", tip])
+            text += f" A compensator, from the episode with the median: {more}"
+        screen.print(f"{text}\n", soft_wrap=True)
+    screen.print(f"All episodes: {folder / 'episodes.csv'}, {Path('episodes.png')}", soft_wrap=True)
+
+
+def _text(found: Summary, count: int) -> str:
+    parts = [f"the slack is identified in {found.identified} of {count} episodes"]
+    if found.identified:
+        parts[0] += (
+            f": median {found.median:.3g}{_interval(found)}, "
+            f"{found.tenth:.3g} to {found.ninetieth:.3g} in 80 % of them"
+        )
+    if found.aligned:
+        parts.append(f"In {found.aligned} it is 0")
+    for reason, episode, number in found.reasons:
+        parts.append(f"Not in {number}, such as episode {episode}: {reason}")
+    return ". ".join(parts) + "."
+
+
+def _interval(found: Summary) -> str:
+    known = math.isfinite(found.low)
+    return f" ({found.low:.3g} to {found.high:.3g}, 95 % interval of the median)" if known else ""
+
+
+def _to_json(found: Summary) -> dict[str, Any]:
+    numbers = asdict(found)
+    reasons = [
+        dict(zip(("missing", "episode", "count"), each, strict=True)) for each in found.reasons
+    ]
+    plain = {
+        key: None if isinstance(value, float) and math.isnan(value) else value
+        for key, value in numbers.items()
+    }
+    return plain | {"reasons": reasons}

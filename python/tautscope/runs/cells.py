@@ -1,0 +1,103 @@
+"""Cells of a table as numbers: decimal commas, dates and times of day; with Polars."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.errors import RecordError
+from tautscope.runs.table_text import NO_VALUE
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Floats = NDArray[np.float64]
+
+LARGEST = 1e100
+"""Largest number: the sum of the squares of larger ones may overflow."""
+_ALLOWED = f"a number up to {LARGEST:g}, or blank or NaN for none"
+_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
+_CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
+
+
+def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]) -> Floats:
+    """A column as numbers; times become seconds since the first one."""
+    import polars as pl  # noqa: PLC0415
+
+    if series.dtype == pl.String:
+        text = series.str.strip_chars().str.strip_chars('"').str.strip_chars()
+        values = _with_decimal_point(text).cast(pl.Float64, strict=False)
+        is_bad = values.is_null() & ~text.str.to_lowercase().is_in(NO_VALUE).fill_null(True)
+        if is_bad.any() and not values.is_finite().any() and (times := _times(text)) is not None:
+            return _seconds(times)
+        is_bad = is_bad | _is_too_large(values)
+        if is_bad.any():
+            index = int(is_bad.arg_max() or 0)
+            where = f"{file}, {line} {rows[index]}, column {name}"
+            raise RecordError(where, text[index], _ALLOWED)
+        return values.fill_null(float("nan")).to_numpy().astype(np.float64)
+    if series.dtype.is_temporal():
+        return _seconds(series)
+    if not (series.dtype.is_numeric() or series.dtype == pl.Boolean):
+        raise RecordError(f"{file}, column {name}", str(series.dtype), "numbers")
+    values = series.cast(pl.Float64)
+    is_bad = _is_too_large(values)
+    if is_bad.any():
+        index = int(is_bad.arg_max() or 0)
+        where = f"{file}, {line} {rows[index]}, column {name}"
+        raise RecordError(where, values[index], _ALLOWED)
+    return values.fill_null(float("nan")).to_numpy().astype(np.float64)
+
+
+def _is_too_large(values: pl.Series) -> pl.Series:
+    """Infinities, too; but not NaN, which Polars orders above all numbers."""
+    return ((values.abs() > LARGEST) & values.is_not_nan()).fill_null(False)
+
+
+def _with_decimal_point(text: pl.Series) -> pl.Series:
+    """Numbers with a decimal comma, also 1.234,5; unchanged if others have a point alone."""
+    has_comma = text.str.contains(",", literal=True).fill_null(False)
+    has_point = text.str.contains(".", literal=True).fill_null(False)
+    if not has_comma.any() or (has_point & ~has_comma).any():
+        return text
+    if text.str.contains(r",.*[.,]").fill_null(False).any():
+        return text
+    return text.str.replace_all(".", "", literal=True).str.replace(",", ".", literal=True)
+
+
+def _times(text: pl.Series) -> pl.Series | None:
+    """Texts as dates or times of day, ISO 8601 or as people write them; None if one is neither."""
+    import polars as pl  # noqa: PLC0415
+
+    plain = (
+        text.str.replace(",", ".", literal=True)
+        .str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
+        .str.replace("T", " ", literal=True)
+    )
+    given = text.is_not_null() & (text != "")
+    readers = [
+        partial(plain.str.strptime, pl.Datetime("ns"), f"{date} {clock}", strict=False)
+        for date in _DATES
+        for clock in _CLOCKS
+    ] + [partial(plain.str.strptime, pl.Time, clock, strict=False) for clock in _CLOCKS]
+    return next(
+        (found for read in readers if ((found := read()).is_not_null() == given).all()), None
+    )
+
+
+def _seconds(times: pl.Series) -> Floats:
+    """Seconds since the first time; NaN where there is none."""
+    import polars as pl  # noqa: PLC0415
+
+    if times.dtype == pl.Duration:
+        ticks = times.dt.total_nanoseconds()
+    elif times.dtype == pl.Time:
+        ticks = times.cast(pl.Int64)
+    else:
+        ticks = times.cast(pl.Datetime("ns")).cast(pl.Int64)
+    first = ticks.drop_nulls()
+    relative = ticks - (first[0] if len(first) else 0)
+    return (relative.cast(pl.Float64) / 1e9).fill_null(float("nan")).to_numpy().astype(np.float64)
