@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,6 +15,8 @@ Object.assign(pad, {axes: [0, 0, 0, 0], buttons: []});
 for (let k = 0; k < 17; k++) pad.buttons.push({pressed: false});
 navigator.getGamepads = () => [pad];
 """
+SET = "(each, value) => { each.value = value; each.dispatchEvent(new Event('change')) }"
+"""Sets a slider or a list as a person does."""
 _KEYS = (("ArrowDown", "ArrowUp"), ("ArrowLeft", "ArrowRight"), ("KeyS", "KeyW"))
 _STICKS = ((1, -1), (0, 1), (3, -1))
 """Axis of the gamepad, and its sign, per DOF."""
@@ -23,41 +25,38 @@ _STICKS = ((1, -1), (0, 1), (3, -1))
 def use_all_controls(page: BrowserPage) -> None:
     """Use every control, one after the other, so that all are as they were at the end."""
 
-    def accepted(what: str) -> None:
-        page.wait_for_function(
-            "what => document.querySelector('#reply').textContent.startsWith(`${what}: done`)",
-            arg=what,
-        )
+    def use(what: str, act: Callable[[], object]) -> None:
+        """Use a control until it is accepted: a busy computer may be late with the state."""
+        for _ in range(10):
+            page.evaluate("document.querySelector('#reply').textContent = ''")
+            act()
+            page.wait_for_function("() => document.querySelector('#reply').textContent")
+            reply = page.inner_text("#reply")
+            if reply.startswith(f"{what}: done"):
+                return
+            page.wait_for_timeout(300)
+        raise RuntimeError(reply)
 
-    for control in page.locator("#dofs [type=checkbox], #compensate").all():
-        control.click()
-        page.wait_for_timeout(150)
-        control.click()
-        page.wait_for_timeout(150)
-    for key in ("c", "c"):
-        page.keyboard.press(key)
-        page.wait_for_timeout(150)
-    accepted("compensation")
-    for slider in page.locator("#dofs [type=range], #gain").all():
-        slider.press("End")
-        page.wait_for_timeout(100)
+    for clutch in page.locator("#dofs [type=checkbox]").all():
+        use("clutch", clutch.click)
+        use("clutch", clutch.click)
+    use("compensation", lambda: page.click("#compensate"))
+    page.wait_for_timeout(300)
+    use("compensation", lambda: page.keyboard.press("c"))
+    for slider in page.locator("#dofs [type=range]").all():
+        use("scale", lambda slider=slider: slider.evaluate(SET, "1"))
+    use("compensation", lambda: page.locator("#gain").evaluate(SET, "1"))
     for profile in ("paper", "best"):
-        page.select_option("#profile", profile)
-        page.wait_for_timeout(300)
-    accepted("profile")
+        use("profile", lambda profile=profile: page.locator("#profile").evaluate(SET, profile))
     for button in ("record", "record", "still"):
-        page.click(f"[data-action={button}]")
-        accepted(button)
+        use(button, lambda button=button: page.click(f"[data-action={button}]"))
     page.fill("#mark", "all controls")
-    page.click("#set_mark")
-    accepted("mark")
+    use("mark", lambda: page.click("#set_mark"))
     page.click("#sound")
     page.click("#sound")
     for program in ("home", "sweep", "experiment"):
-        page.click(f"[data-action={program}]")
-        accepted(program)
-        page.click("[data-action=end_program]")
-        accepted("end_program")
+        use(program, lambda program=program: page.click(f"[data-action={program}]"))
+        use("end_program", lambda: page.click("[data-action=end_program]"))
 
 
 @contextmanager

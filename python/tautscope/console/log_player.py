@@ -198,4 +198,5 @@ class LogPlayer:
         name, _, value = request.text.partition(" ")
         if name == "set_compensation":
             self._state.compensation = float(value)
-        self._state.message = f"Recording {self._log.path.name}: {request.text}"
+        if name == "note":
+            self._state.message = f"Recording {self._log.path.name}: {value}"

@@ -242,6 +242,7 @@ function hint() {
 
 function showTime() {
   $("timeline").hidden = !state.replay;
+  $("controls").hidden = Boolean(state.replay);
   if (!state.replay) return;
   const [time, length, isPlaying] = state.replay;
   $("seek").max = length;
@@ -262,7 +263,7 @@ function update() {
   if (!layout) return;
   const hasImage = layout.sees_bands || view.sequence > 0;
   const isOld = performance.now() - view.drawnAt > LOST;
-  $("stale").hidden = !isOld || !hasImage;
+  $("stale").hidden = !isOld || !hasImage || (!isLost && state.replay !== null && !state.replay[2]);
   if (isLost) {
     $("message").textContent = "No data from the control process. Motion has stopped; use the emergency stop if not.";
     return;
