@@ -1,6 +1,6 @@
 """The operator's console: hazards with number of runs and failures, and figures with a browser.
 
-Debian's chromium is needed for --images, --ticks, --warnings and --hand.
+Debian's chromium is needed for --images, --ticks, --warnings, --steer and --hand.
 
     uv run python benchmarks/console --requests 100000 --stops 300 --write
     uv run python benchmarks/console --images 30 --ticks 60 --warnings 50 --hand 120
@@ -43,6 +43,7 @@ def arguments() -> argparse.Namespace:
     count("ticks", "seconds of control ticks with and without a browser; 100")
     count("warnings", "U1: warnings until the page shows them; 50")
     count("hand", "seconds of operator motion by a gamepad; 120")
+    count("steer", "seconds of steering with each device after every control was used; 60")
     parser.add_argument("--write", action="store_true", help="update docs/safety.md")
     return parser.parse_args()
 
@@ -85,7 +86,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         measure(options, folder)
-        if options.images or options.ticks or options.warnings or options.hand:
+        if any((options.images, options.ticks, options.warnings, options.steer, options.hand)):
             from console import live  # noqa: PLC0415  playwright
 
             for size in SIZES if options.images else ():
@@ -98,6 +99,10 @@ def main() -> None:
             if options.warnings:
                 result = live.warnings(folder / "warnings", options.warnings)
                 print(json.dumps({"warnings": result}), flush=True)
+            if options.steer:
+                print(
+                    json.dumps({"steer": live.steer(folder / "steer", options.steer)}), flush=True
+                )
             if options.hand:
                 print(json.dumps(live.hand(folder / "hand", options.hand)), flush=True)
 

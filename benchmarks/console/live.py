@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from console.pages import Address, Page, sized
+from console.steering import DEVICES, GAMEPAD, holding, use_all_controls
 from playwright.sync_api import Page as BrowserPage
 from playwright.sync_api import sync_playwright
 from tautscope.config import Config
@@ -45,8 +46,7 @@ START_TIME = 8.0
 """Time after which a measurement begins [s]."""
 HAND_SIZE = "360x288"
 """Size of the images of the operator motion, which runs twice in one process too."""
-"""Of the page's gamepad."""
-GAMEPAD = """
+FOLLOWING_GAMEPAD = """
 window.pad = {connected: true, id: "simulated", mapping: "standard", axes: [0, 0, 0, 0],
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
 navigator.getGamepads = () => {
@@ -206,11 +206,48 @@ class Recorded:
         return found
 
 
+def steer(folder: Path, seconds: float) -> dict[str, dict[str, float]]:
+    """Steering with each device after every control was used.
+
+    A stroke is a DOF held for 0.5 s; where nothing moves, because a command was late, the operator
+    lets go and holds again, five times at most.
+    """
+    found: dict[str, dict[str, float]] = {}
+    with live_console(folder, sized(HAND_SIZE)) as console, browser_page(GAMEPAD) as page:
+        operator = console.control.operator
+        page.goto(console.address.url)
+        page.wait_for_timeout(3000)
+        page.click("#take")
+        page.wait_for_timeout(500)
+        use_all_controls(page)
+        for device in DEVICES:
+            strokes = presses = still = wrong = 0
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                dof, sign = strokes % 3, 1 - strokes // 3 % 2 * 2
+                before = operator.reference.copy()
+                for _ in range(5):
+                    with holding(page, device, dof, sign):
+                        page.wait_for_timeout(500)
+                    page.wait_for_timeout(200)
+                    presses += 1
+                    moved = operator.reference - before
+                    if moved[dof] * sign > 0:
+                        break
+                strokes += 1
+                still += not moved[dof] * sign > 0
+                wrong += bool(np.delete(moved, dof).any())
+            counts = {"strokes": strokes, "presses": presses, "no motion": still}
+            found[device] = {**counts, "other motion": wrong}
+        found["refused"] = {key: float(value) for key, value in operator.refused.items()}
+    return found
+
+
 def hand(folder: Path, seconds: float) -> dict[str, dict[str, float]]:
     """Reduction of the tracking error by gamepad and page, and in one process [%]."""
     config = sized(HAND_SIZE)
     motion = OperatorMotion(config.experiment, FIRST_SEED, seconds)
-    with live_console(folder, config) as console, browser_page(GAMEPAD) as page:
+    with live_console(folder, config) as console, browser_page(FOLLOWING_GAMEPAD) as page:
         page.goto(console.address.url)
         page.wait_for_timeout(3000)
         page.click("#take")

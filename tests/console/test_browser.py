@@ -14,9 +14,12 @@ import numpy as np
 import pytest
 import tautscope
 from common.paths import ROOT
+from console.steering import DEVICES, GAMEPAD, holding, use_all_controls
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from running import AGE, Arm, RunningConsole, rests, running_console
+from tautscope.config import load_config
 from tautscope.console.paced_rig import PacedRig
+from tautscope.dof import Dof
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
@@ -24,12 +27,6 @@ FLAGS = [
     "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
     "--disable-background-networking", "--disable-component-update",
 ]  # fmt: skip
-GAMEPAD = """
-window.pad = {connected: true, id: "simulated", index: 0, mapping: "standard"};
-Object.assign(pad, {axes: [0, 0, 0, 0], buttons: []});
-for (let k = 0; k < 17; k++) pad.buttons.push({pressed: false});
-navigator.getGamepads = () => [pad];
-"""
 TIMEOUT = 20_000  # ms
 
 
@@ -306,7 +303,7 @@ def test_warnings_stay_until_acknowledged(console: RunningConsole, open_page) ->
 def test_controls_reach_the_loop(console: RunningConsole, open_page) -> None:
     page = open_page()
     take(page)
-    page.uncheck("#compensate")
+    page.keyboard.press("c")
     wait(lambda: console.control.compensation == 0)
     page.check("#compensate")
     wait(lambda: console.control.compensation == 1)
@@ -317,6 +314,10 @@ def test_controls_reach_the_loop(console: RunningConsole, open_page) -> None:
     wait(lambda: console.control.operator.program is not None)
     page.click("[data-action=end_program]")
     wait(lambda: console.control.operator.program is None)
+    expect(page.locator("#program")).to_contain_text("sweep ended early, at", timeout=TIMEOUT)
+    page.reload()
+    expect(page.locator("#program")).to_contain_text("sweep ended early, at", timeout=TIMEOUT)
+    take(page)
     page.locator("[aria-label='scale of bending']").press("End")
     wait(lambda: console.control.operator.scale[2] == 1)
     assert rests(console, 0.1)
@@ -362,21 +363,62 @@ def test_a_killed_browser_stops_motion(console: RunningConsole, open_page, brows
         with_processes.close()
 
 
+SIZES = ((1440, 900), (1024, 768), (3840, 2160), (768, 1024), (390, 844), (844, 390), (320, 480))
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1024, 768), (3840, 2160)], ids=["1024", "4K"])
-def test_nothing_is_cut_off_and_axe_finds_no_serious_fault(
-    console: RunningConsole, open_page, scheme: str, size: tuple[int, int]
+def test_stop_is_always_on_top_nothing_is_cut_off_and_axe_finds_no_fault(
+    console: RunningConsole, open_page, scheme: str
 ) -> None:
     page = open_page()
     page.emulate_media(color_scheme=scheme)
-    page.set_viewport_size({"width": size[0], "height": size[1]})
     take(page)
-    assert overflow(page) == []
+    if AXE.exists():
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        sides = ("right",) if height < 700 or width < 1000 else ()
+        assert overflow(page, *sides) == [], (width, height)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        for place in (0, 10_000):
+            on_top = page.locator("#stop").evaluate(
+                "(stop, place) => { scrollTo(0, place); const box = stop.getBoundingClientRect();"
+                " return [[5, 5], [box.width / 2, box.height / 2], [box.width - 5, box.height - 5]]"
+                " .map(([x, y]) => document.elementFromPoint(box.x + x, box.y + y)?.id) }",
+                place,
+            )
+            assert on_top == ["stop"] * 3, (width, height, place)
+        if AXE.exists() and width in (1440, 768, 390):
+            found = page.evaluate("axe.run(document)")["violations"]
+            assert [(each["id"], each["nodes"][0]["html"]) for each in found] == []
     if not AXE.exists():
         pytest.skip(f"no {AXE}: `npm pack axe-core`, unpacked there, as .ci/run does")
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-    found = page.evaluate("axe.run(document)")["violations"]
-    assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []
+
+
+def test_each_device_steers_after_every_control_was_used_and_a_touch_stops(
+    console: RunningConsole, open_page
+) -> None:
+    page = open_page(script=GAMEPAD)
+    take(page)
+    use_all_controls(page)
+    page.set_viewport_size({"width": 390, "height": 844})
+    for device in DEVICES:
+        for dof in range(3):
+            wait(lambda: not console.control.operator.must_release)
+            before = console.control.operator.reference
+            forwards = before[dof] < load_config().experiment[Dof(dof)].centre
+            with holding(page, device, dof, 1 if forwards else -1):
+                wait(lambda: moves(console))
+                expect(page.locator(".dof.moved b").first).to_have_text(
+                    Dof(dof).label, timeout=TIMEOUT
+                )
+                assert page.locator(".dof:visible").count() == 1
+            wait(lambda: not moves(console))
+            moved = console.control.operator.reference - before
+            assert [k for k in range(3) if moved[k]] == [dof], device
+            assert (moved[dof] > 0) == forwards
+    page.locator("#stop").dispatch_event("pointerdown")
+    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
 
 
 @pytest.mark.parametrize("count", [1, 8])

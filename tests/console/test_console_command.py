@@ -79,3 +79,4 @@ def test_it_prints_its_address_and_ends_with_ctrl_c(
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
         assert process.stderr.read() == b""
+        assert json.loads(process.stdout.read()) == {"log": str(tmp_path / "out/console-1.mcap")}

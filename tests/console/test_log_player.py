@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from drawn import short_experiment
@@ -49,3 +50,38 @@ def test_the_player_shows_the_recorded_states_and_images(tmp_path: Path, monkeyp
     reply = shown.replies.following()
     assert reply is not None
     assert not msg.decode_reply(reply[1]).is_accepted
+
+
+def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
+    config = short_experiment()
+    path = tmp_path / "run.mcap"
+    record(path, config, 0.6)
+    log = read_log(path)
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    shown, player = Channels(memory), LogPlayer(log, Channels(memory))
+    ticks = [event for event in log.events.values() if isinstance(event, Tick)]
+
+    def seek(time: float | None, is_playing: bool) -> dict[str, Any]:
+        request = msg.Received(1, 0.0, msg.Seek(time, is_playing))
+        shown.inbound.write(msg.encode(request))
+        player.publish()  # which reads it
+        player.publish()
+        found = shown.state.newest()
+        assert found is not None
+        return msg.decode_state(found[1])
+
+    try:
+        for time in (0.4, 0.1, 1e9):
+            state = seek(time, is_playing=False)
+            shows = min(ticks[0].sample.time + time, ticks[-1].sample.time)
+            nearest = min(ticks, key=lambda tick: abs(tick.sample.time - shows))
+            assert state["command"] == nearest.command.tolist()
+            length = ticks[-1].sample.time - ticks[0].sample.time
+            assert state["replay"] == [nearest.sample.time - ticks[0].sample.time, length, False]
+            player.run(lambda: True)
+            assert seek(None, is_playing=False)["time"] == state["time"]  # it stays
+        seek(0.5, is_playing=True)
+        player.run(lambda: True)
+        assert seek(None, is_playing=False)["time"] == ticks[-1].sample.time
+    finally:
+        player.close()

@@ -15,6 +15,7 @@ from tautscope.console.operator_input import (
     COMMAND_TIMEOUT,
     DEAD_BAND,
     LARGEST_SPEED,
+    PROGRAM_TIMEOUT,
     OperatorInput,
 )
 from tautscope.console.programs import experiment, home, sweep
@@ -227,6 +228,7 @@ def test_a_program_ends_where_it_should_and_only_runs_with_the_page(make) -> Non
     while desk.input.program is not None:
         desk.servo(is_holding=False)
         largest = np.maximum(largest, np.abs(desk.tick()))
+    assert desk.input.program_ended.endswith(": done")
     assert np.allclose(desk.input.reference, START, atol=SPEED * PERIOD)
     assert (largest <= np.array(CONFIG.safety.reference_speed) * PERIOD).all()
     desk.input.program = make(CONFIG, START + 0.01)
@@ -234,7 +236,9 @@ def test_a_program_ends_where_it_should_and_only_runs_with_the_page(make) -> Non
     last = desk.now
     while desk.input.program is not None:
         desk.tick()
-    assert COMMAND_TIMEOUT < desk.now - last <= COMMAND_TIMEOUT + 1.5 * PERIOD
+    assert PROGRAM_TIMEOUT < desk.now - last <= PROGRAM_TIMEOUT + 1.5 * PERIOD
+    assert "ended early, at " in desk.input.program_ended
+    assert "no accepted command for 0.5 s" in desk.input.program_ended
 
 
 @dataclass

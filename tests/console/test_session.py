@@ -197,8 +197,14 @@ def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
         page = console.page()
         page.take()
         page.move((0, 1, 1))
+        formats, replies = [], []
         for action in ("record", "still", "record", "acknowledge"):
-            assert page.request(type="action", name=action)["is_accepted"]
+            replies.append(page.request(type="action", name=action))
+            formats.append(console.control.run.log.image_format)
+        assert formats == ["png", "png", "jpeg", "jpeg"]
+        assert all(reply["is_accepted"] for reply in replies)
+        path = tmp_path / "console-1.mcap"
+        assert f"tautscope console --replay {path}" in replies[2]["reason"]
         page.request(type="setting", name="compensation", value=0)
         page.move((0, -1, 0))
         page.request(type="action", name="mark", text="here")

@@ -3,6 +3,7 @@
 import errno
 import os
 import time
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from typing import IO, Any
@@ -127,6 +128,23 @@ def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None
     lost = next(index for index in updates if not read.has_image(index))
     with pytest.raises(RecordError, match="an update with its image"):
         read.image(lost)
+
+
+def test_images_are_lossless_while_that_is_requested(tmp_path: Path, config: Config) -> None:
+    lossy = config.replace(**{"recording.image_format": "jpeg"})
+    rig, loop = DrawnRig(lossy), HysteresisReduction(lossy)
+    sample = rig.reset()
+    loop.step(sample.applied, 0.0)
+    noise = np.random.default_rng(3).integers(0, 256, sample.frame.image.shape, np.uint8)
+    frame = replace(sample.frame, image=noise)
+    report = loop.on_frame(frame)
+    formats = ["jpeg", "png", "png", "jpeg"]
+    with LogWriter(tmp_path / "run.mcap", lossy, wait=True) as log:
+        for log.image_format in formats:
+            log.frame(sample.time, frame, report)
+    read = read_log(tmp_path / "run.mcap")
+    exact = [(read.image(index) == noise).all() for index in read.events]
+    assert exact == [each == "png" for each in formats]
 
 
 def test_logged_arrays_may_be_reused(tmp_path: Path, config: Config) -> None:

@@ -54,9 +54,14 @@ def _console(options: argparse.Namespace) -> int:
         what, note = str(options.replay), "Nothing moves."
         return play(options.replay, options.port, announce)
     require_extras("tautscope console", ["twin" if options.twin else "hardware"])
+    from tautscope.console.actions import replay_command  # noqa: PLC0415
     from tautscope.console.start import start_console  # noqa: PLC0415
 
     config, make = choose_rig(options, in_real_time=True)
     folder = arguments.out_folder(options)
     what, note = rig_in_words(options), "Whoever has this address can move it."
-    return start_console(make(config), config, folder, options.port, announce)
+    status = start_console(make(config), config, folder, options.port, announce)
+    for log in sorted(folder.glob("console-*.mcap")):
+        text = f"Log: {log}\nSee it again: {replay_command(log)}"
+        print_now(options.json, "log", str(log), text)
+    return status

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta
 
@@ -10,6 +10,7 @@ from tautscope.config.fields import Positive
 from tautscope.config.section import Section
 
 ImageFormat = Literal["png", "jpeg"]
+IMAGE_FORMATS: tuple[ImageFormat, ...] = get_args(ImageFormat)
 
 
 class RecordingConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

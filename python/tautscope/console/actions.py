@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from tautscope.console import messages as msg
 from tautscope.console.programs import PROGRAMS, programs_of
@@ -25,24 +27,26 @@ class Actions:
         self._control = control
         self._newest_image = newest_image
         self._takes = self._stills = 0
+        self._text, self._take_began = "", 0.0
 
     def execute(self, inbound: msg.Received | msg.Gone) -> msg.Reply | None:
         """Execute a message; the reply to its page, if there is one."""
         control = self._control
         if isinstance(inbound, msg.Gone):
             if control.lease.release(inbound.client):
-                control.operator.interrupt()
+                control.operator.interrupt("the page is gone")
                 self._control.note(f"page {inbound.client} is gone; the lease is free")
             return None
         client, message = inbound.client, inbound.message
         if isinstance(message, msg.Take):
-            control.operator.interrupt()
+            control.operator.interrupt("control was taken")
             control.lease.take(client)
             self._control.note(f"page {client} takes lease {control.lease.number}")
             return msg.Reply(client, "take", True)
-        if isinstance(message, msg.Servo | msg.Stop):
+        if isinstance(message, msg.Servo | msg.Stop | msg.Seek):
             return None
         what = message.name if isinstance(message, msg.Action | msg.Setting) else "profile"
+        self._text = ""
         reason = control.lease.refusal(
             client, message, time.monotonic(), needs_image=what in PROGRAMS
         )
@@ -52,7 +56,7 @@ class Actions:
             reason = self._execute(message)
         if not reason:
             self._control.note(f"page {client}: {_described(message)}")
-        return msg.Reply(client, what, not reason, reason[: msg.LONGEST_REASON])
+        return msg.Reply(client, what, not reason, (reason or self._text)[: msg.LONGEST_REASON])
 
     def _execute(self, message: msg.Request) -> str:
         """Execute a request; why it cannot be, else empty."""
@@ -70,7 +74,7 @@ class Actions:
         if setting.name == "compensation":
             self._control.compensation = setting.value
             if self._control.run is not None:
-                self._control.run.loop.set_compensation(setting.value)
+                self._control.run.set_compensation(setting.value)
             return ""
         names = [dof.label for dof in self._control.config.dofs]
         if setting.dof not in names:
@@ -104,12 +108,11 @@ class Actions:
             return "motion is stopped"
         if not operator.is_present(time.monotonic()):
             return "no command for 0.1 s"
-        operator.interrupt()
-        operator.program = PROGRAMS[name](control.config, operator.reference)
+        operator.start(PROGRAMS[name](control.config, operator.reference))
         return ""
 
     def _end_program(self, _: msg.Action) -> str:
-        self._control.operator.interrupt()
+        self._control.operator.interrupt("End program")
         return ""
 
     def _enable(self, _: msg.Action) -> str:
@@ -132,7 +135,7 @@ class Actions:
 
     def _release(self, _: msg.Action) -> str:
         control = self._control
-        control.operator.interrupt()
+        control.operator.interrupt("control was given up")
         assert control.lease.holder is not None
         control.lease.release(control.lease.holder)
         return ""
@@ -141,12 +144,20 @@ class Actions:
         return "" if self._control.run is not None else "there is no log"
 
     def _record(self, _: msg.Action) -> str:
-        if self._control.run is None:
+        control, run = self._control, self._control.run
+        if run is None:
             return "there is no log"
-        self._control.is_recording = not self._control.is_recording
-        self._takes += self._control.is_recording
-        verb = "begins" if self._control.is_recording else "ends"
-        self._control.note(f"take {self._takes} {verb}")
+        control.record(is_recording=not control.is_recording)
+        if control.is_recording:
+            self._takes += 1
+            self._take_began = run.sample.time
+            self._text = f"take {self._takes}, lossless, into {run.path}"
+        else:
+            self._text = (
+                f"take {self._takes} is in {run.path}, from {self._take_began:.0f} to "
+                f"{run.sample.time:.0f} s. See it again: {replay_command(run.path)}"
+            )
+        control.note(f"take {self._takes} {'begins' if control.is_recording else 'ends'}")
         return ""
 
     def _still(self, _: msg.Action) -> str:
@@ -156,7 +167,13 @@ class Actions:
         self._stills += 1
         path = self._control.folder / f"still-{self._stills}.png"
         write_still(path, image.copy(), self._control.config.camera.pixel_format)
+        self._text = f"the image is in {path}"
         return ""
+
+
+def replay_command(path: Path) -> str:
+    """The command that shows a log on the page."""
+    return shlex.join(["tautscope", "console", "--replay", str(path)])
 
 
 def _described(message: msg.Request) -> str:

@@ -13,6 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.console.uncompensated import (
+    MODEL,
+    SECOND_PLANT,
+    ComparedRig,
+    PlayTip,
+    Score,
+)
 from tautscope.log.writer import LogWriter
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
@@ -24,6 +31,8 @@ LATE = 2.0
 """A tick that begins so many control periods after the last one is late."""
 _TIMES = 200_000
 """Number of ticks whose times are kept."""
+_KEPT = 200
+"""Number of ticks for which the tip without compensation is kept, longer than an image's way."""
 
 
 class ReferenceSource(Protocol):
@@ -64,7 +73,11 @@ class ControlRun(ControlLoop):
         ticks: Number of ticks.
         late: Number of ticks that were late.
         unused: Number of images that the loop did not use.
+        compensation: Share of the compensation that the operator has chosen.
         times: Computing time of each tick [s].
+        uncompensated: Where the tip would be now without compensation (n,) [m or rad].
+        uncompensated_by: By what that is known.
+        score: Tracking errors with and without compensation.
     """
 
     def __init__(
@@ -89,7 +102,32 @@ class ControlRun(ControlLoop):
         self.reference = self.command = operator.reference.copy()
         self.report: Report | None = None
         self.ticks = self.late = self.unused = 0
+        self.compensation = 1.0
         self.times: deque[float] = deque(maxlen=_TIMES)
+        truth = sample.true_state
+        self.uncompensated = self.reference if truth is None else np.array(truth, np.float64)
+        self._model = PlayTip(self.uncompensated)
+        self.uncompensated_by = SECOND_PLANT if isinstance(rig, ComparedRig) else MODEL
+        self._uncompensated: deque[tuple[float, Floats]] = deque(maxlen=_KEPT)
+        self.score = Score(len(self.reference), rig.control_period)
+
+    @property
+    def tip(self) -> Floats:
+        """Estimated tip (n,) [m or rad]; NaN where it is not known.
+
+        Between images `paper` has no estimate: its predicted state is the model's alone, and the
+        tip is that of the newest image.
+        """
+        if self._config.profile == "best":
+            return self.loop.predicted_state
+        if self.report is None:
+            return np.full(len(self.reference), np.nan)
+        return np.where(self.report.observable, self.report.state_estimate, np.nan)
+
+    def uncompensated_at(self, time: float) -> Floats:
+        """Where the tip would have been without compensation at a time [s, the rig's clock]."""
+        kept = self._uncompensated
+        return next((state for at, state in reversed(kept) if at <= time), self.uncompensated)
 
     def tick(self) -> list[tuple[Frame | Measurement, Report, float]]:
         """Compute the command; the updates that have ended, with the arrivals of what caused them.
@@ -103,6 +141,10 @@ class ControlRun(ControlLoop):
         self.reference = self._operator.update(began, period, self.command, is_held=self.is_held)
         age = self._operator.age
         self.control(self.reference, None if age is None else sample.time - age)
+        self._uncompensated.append((sample.time, self.uncompensated))
+        if self.compensation > 0:
+            tip = self.tip if sample.true_state is None else np.array(sample.true_state)
+            self.score.add(self.reference, tip, self.uncompensated)
         self.ticks += 1
         self.times.append(time.monotonic() - began)
         if sample.frame is not None:
@@ -120,6 +162,21 @@ class ControlRun(ControlLoop):
             updates.append((source, report, arrived_at))
         self.write_events()
         return updates
+
+    def step(self) -> None:
+        """As `ControlLoop.step`, also for the tip without compensation."""
+        super().step()
+        if isinstance(self._rig, ComparedRig):
+            self.uncompensated = self._rig.step_uncompensated(self.reference)
+        else:
+            offsets = self.loop.delta_minus, self.loop.delta_plus
+            self.uncompensated = self._model.step(self.reference, *offsets)
+
+    def set_compensation(self, share: float) -> None:
+        """As `HysteresisReduction.set_compensation`."""
+        if share != self.compensation:
+            self.loop.set_compensation(share)
+        self.compensation = share
 
     def note(self, text: str) -> None:
         """Write a note into the log."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
 from tautscope.console.paced_rig import Pace
@@ -16,7 +17,7 @@ from tautscope.twin.rig import Twin
 
 
 class LiveTwin(Twin):
-    """The twin at the pace of the monotonic clock.
+    """The twin at the pace of the monotonic clock, with a second one to compare with.
 
     A tick that wakes late does not catch up: the rig's clock stands meanwhile. An image that is due
     while another is rendered is dropped.
@@ -35,6 +36,8 @@ class LiveTwin(Twin):
     def reset(self) -> Sample:
         """As `Twin.reset`; its clock starts."""
         sample = super().reset()
+        seed = np.random.SeedSequence(self.config.twin.seed).spawn(1)[0]
+        self._uncompensated = Plant(self.config, np.random.default_rng(seed))
         self._pace = Pace(self.control_period)
         return sample
 
@@ -42,6 +45,11 @@ class LiveTwin(Twin):
         """As `Twin.step`, and wait for the end of the control period."""
         self._pace.wait()
         return super().step(command)
+
+    def step_uncompensated(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Let a control period pass for the same instrument with the reference as command."""
+        self._uncompensated.step(reference)
+        return self._uncompensated.true_state
 
     def close(self) -> None:
         """Release the simulation and the renderer."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from bisect import bisect_left
 from collections.abc import Callable
 from os import PathLike
 
@@ -14,6 +15,7 @@ from tautscope.console.publisher import Bands, Publisher, Update
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
 from tautscope.console.state import ImageState, LogState, blank_state, known, show_truth, values
+from tautscope.console.uncompensated import MODEL, PlayTip, Score
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.reader import Update as LoggedUpdate
@@ -23,8 +25,10 @@ from tautscope.loop.rig import Frame
 Floats = NDArray[np.float64]
 STATE_PERIOD = 0.02
 """Time between two states for the page [s]."""
-_END_PERIOD = 0.2
-"""The same after the end of the log."""
+_IDLE_PERIOD = 0.1
+"""The same while the log does not play [s]."""
+_LEAD_IN = 0.5
+"""Time of the log that is read, and not shown, before the one that was chosen [s]."""
 
 
 def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) -> int:
@@ -40,10 +44,10 @@ def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) 
         announce(url)
         player = LogPlayer(log, channels)
         try:
-            player.run(server.is_alive)
             while server.is_alive():
+                player.run(server.is_alive)
                 player.publish()
-                time.sleep(_END_PERIOD)
+                time.sleep(_IDLE_PERIOD)
         except KeyboardInterrupt:
             return 0
         finally:
@@ -70,33 +74,41 @@ class LogPlayer:
         self._state.must_release = False
         self._state.drives = "recorded"
         self._state.log = LogState(str(log.path), log.path.stat().st_size)
+        self._state.uncompensated_by = MODEL
         self._published_at = 0.0
         self._images = 0
+        self._events = list(log.events.items())
+        ticks = ((k, each[1]) for k, each in enumerate(self._events))
+        found = [(each.sample.time, k) for k, each in ticks if isinstance(each, Tick)]
+        self._times, self._indices = [at for at, _ in found], [k for _, k in found]
+        self._is_playing = True
+        self._next = 0
+        self._offset: float | None = None
+        self._seek(0.0)
 
     def run(self, may_continue: Callable[[], bool]) -> None:
-        """Publish all events at the pace of the recording."""
-        offset: float | None = None
-        for index, event in self._log.events.items():
-            if not may_continue():
-                return
+        """Publish the events from the present one on, at the pace of the recording."""
+        while self._is_playing and self._next < len(self._events) and may_continue():
+            index, event = self._events[self._next]
+            self._next += 1
             if isinstance(event, Tick):
                 now = event.sample.time
-                offset = time.monotonic() - now if offset is None else offset
-                time.sleep(max(0.0, offset + now - time.monotonic()))
-                self._add_tick(event)
-            elif isinstance(event, LoggedUpdate):
-                self._add_update(index, event)
-            else:
-                self._add_request(event)
+                self._offset = time.monotonic() - now if self._offset is None else self._offset
+                time.sleep(max(0.0, self._offset + now - time.monotonic()))
+            self._add(index, event)
             if time.monotonic() - self._published_at >= STATE_PERIOD:
                 self.publish()
-        self._state.message = f"End of the recording {self._log.path.name}."
+        if self._next == len(self._events):
+            self._is_playing = False
+            self._state.message = f"End of the recording {self._log.path.name}."
 
     def publish(self) -> None:
         """Publish the state."""
         self._answer()
-        self._state.now = self._published_at = time.monotonic()
-        self._channels.state.write(msg.encode(self._state))
+        state, times = self._state, self._times or [0.0]
+        state.replay = state.time - times[0], times[-1] - times[0], self._is_playing
+        state.now = self._published_at = time.monotonic()
+        self._channels.state.write(msg.encode(state))
 
     def close(self) -> None:
         """End the thread of the images."""
@@ -105,12 +117,52 @@ class LogPlayer:
     def _answer(self) -> None:
         while (found := self._channels.inbound.following()) is not None:
             inbound = msg.decode_inbound(found[1])
-            if isinstance(inbound, msg.Received):
+            if isinstance(inbound, msg.Received) and isinstance(inbound.message, msg.Seek):
+                if inbound.message.time is not None:
+                    self._seek(inbound.message.time)
+                self._is_playing, self._offset = inbound.message.is_playing, None
+            elif isinstance(inbound, msg.Received):
                 reply = msg.Reply(inbound.client, "request", False, "this is a recording")
                 self._channels.replies.write(msg.encode(reply))
 
+    def _seek(self, time: float) -> None:
+        """Go to a time from the begin of the log [s], with the states shortly before it."""
+        self._offset = None
+        self._model: PlayTip | None = None
+        self._score = Score(len(self._log.config.dofs), self._log.config.control.period)
+        if not self._times:
+            return
+
+        def tick_at(time: float) -> int:
+            at = bisect_left(self._times, self._times[0] + time)
+            return self._indices[min(at, len(self._times) - 1)]
+
+        self._next, begin = tick_at(time), self._events[tick_at(time - _LEAD_IN)][0]
+        self._state.message = f"Recording {self._log.path.name}. Nothing is steered."
+        for index, event in self._events[: self._next + 1]:
+            if index >= begin or isinstance(event, Request):
+                self._add(index, event)
+
+    def _add(self, index: int, event: Tick | LoggedUpdate | Request) -> None:
+        if isinstance(event, Tick):
+            self._add_tick(event)
+        elif isinstance(event, LoggedUpdate):
+            self._add_update(index, event)
+        else:
+            self._add_request(event)
+
     def _add_tick(self, tick: Tick) -> None:
         state = self._state
+        truth = tick.sample.true_state
+        if self._model is None:
+            self._model = PlayTip(tick.reference if truth is None else truth)
+        offsets = np.array(state.delta_minus), np.array(state.delta_plus)
+        without = self._model.step(tick.reference, *offsets)
+        state.uncompensated = values(without)
+        tip = np.array(state.tip if truth is None else truth, np.float64)
+        if state.compensation > 0:
+            self._score.add(tick.reference, tip, without)
+        state.score = self._score.errors
         state.time = tick.sample.time
         state.reference, state.command = values(tick.reference), values(tick.command)
         state.applied = values(tick.sample.applied)
@@ -137,8 +189,14 @@ class LogPlayer:
             frame = Frame(self._log.image(index), captured_at, int(row["sequence"]))  # type: ignore[call-overload]
             found = tuple(np.isfinite(row[f"features_{band}_x"]) for band in "ab")  # type: ignore[call-overload]
             reference = np.array(state.reference)
-            bands = Bands(estimate, predicted, reference, (bool(found[0]), bool(found[1])))
+            without = np.array(state.uncompensated, np.float64)
+            is_found = bool(found[0]), bool(found[1])
+            bands = Bands(estimate, predicted, reference, without, is_found)
             self._publisher.submit(Update(self._images, frame, time.monotonic(), bands))
 
     def _add_request(self, request: Request) -> None:
-        self._state.message = f"Recording {self._log.path.name}: {request.text}"
+        name, _, value = request.text.partition(" ")
+        if name == "set_compensation":
+            self._state.compensation = float(value)
+        if name == "note":
+            self._state.message = f"Recording {self._log.path.name}: {value}"

@@ -110,6 +110,18 @@ class SetProfile(Command, frozen=True, tag="profile"):
     profile: Literal["paper", "best"]
 
 
+class Seek(_Message, frozen=True, tag="seek"):
+    """Show another time of a recording; needs no lease, and does nothing else.
+
+    Attributes:
+        time: From its begin [s]; None to stay.
+        is_playing: Whether time goes on.
+    """
+
+    time: Annotated[float, Meta(ge=0, le=1e9)] | None
+    is_playing: bool
+
+
 class Drawn(_Message, frozen=True, tag="drawn"):
     """An image has been drawn.
 
@@ -126,7 +138,7 @@ LONGEST_REASON = 500
 """Characters of an error shown at most; escaped, they fit into a record of shared memory."""
 Request: TypeAlias = Action | Setting | SetProfile
 """Commands that are executed once, in their order."""
-ControlMessage: TypeAlias = Stop | Take | Servo | Action | Setting | SetProfile
+ControlMessage: TypeAlias = Stop | Take | Seek | Servo | Action | Setting | SetProfile
 
 decode_hello = msgspec.json.Decoder(Hello).decode
 decode_control = msgspec.json.Decoder(ControlMessage).decode
@@ -144,7 +156,7 @@ class Received(Struct, frozen=True, tag=True):
 
     client: int
     at: float
-    message: Take | Servo | Action | Setting | SetProfile | Stop
+    message: Take | Seek | Servo | Action | Setting | SetProfile | Stop
 
 
 class Gone(Struct, frozen=True, tag=True):
@@ -154,7 +166,14 @@ class Gone(Struct, frozen=True, tag=True):
 
 
 class Reply(Struct, frozen=True):
-    """Result of a command, from the control process to a page."""
+    """Result of a command, from the control process to a page.
+
+    Attributes:
+        client: Number of the page's connection.
+        what: The command.
+        is_accepted: Whether it was executed.
+        reason: Why not, or what a person should know of what was done.
+    """
 
     client: int
     what: str

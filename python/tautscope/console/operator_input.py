@@ -21,6 +21,8 @@ from tautscope.console.programs import Program
 Floats = NDArray[np.float64]
 COMMAND_TIMEOUT = 0.1
 """Time without an accepted command after which motion stops [s]."""
+PROGRAM_TIMEOUT = 0.5
+"""The same for a program, which nobody holds: a page may be busy for a moment, not gone [s]."""
 LARGEST_SPEED = 0.75
 """Speed at full deflection and scale 1 [of the largest speed that the loop follows]."""
 DEAD_BAND = 0.2
@@ -51,6 +53,7 @@ class OperatorInput:
         scale: (n,) share of the largest speed at full deflection.
         is_coupled: (n,) whether the input device moves each DOF (clutch).
         program: The motion that runs by itself, if there is one.
+        program_ended: How the last program ended; empty before one has.
         age: None, because the reference is made in the tick.
         rested_by: Why the last motion ended, if the operator did not end it.
         stopped_by: Why motion is stopped until it is enabled; empty if it is not.
@@ -72,6 +75,7 @@ class OperatorInput:
         self.scale = np.full(count, 0.4)
         self.is_coupled = np.ones(count, bool)
         self.program: Program | None = None
+        self.program_ended = ""
         self.stopped_by = self.rested_by = ""
         self.refused: Counter[str] = Counter()
         self._axes = np.zeros(count)
@@ -86,8 +90,12 @@ class OperatorInput:
         return self.program is not None or bool(self._velocity.any())
 
     def is_present(self, now: float) -> bool:
-        """Whether a command was accepted in the last `COMMAND_TIMEOUT`, at a time [s]."""
-        return now - self._accepted_at <= COMMAND_TIMEOUT
+        """Whether a command was accepted lately, at a time [s]."""
+        return now - self._accepted_at <= self._timeout
+
+    @property
+    def _timeout(self) -> float:
+        return COMMAND_TIMEOUT if self.program is None else PROGRAM_TIMEOUT
 
     def receive(self, received: Received, now: float) -> None:
         """Take a deflection of the input device, unless the lease refuses it."""
@@ -111,8 +119,13 @@ class OperatorInput:
             self._axes[:] = 0
         elif not self.must_release:
             self.rested_by = ""
-            self.program = None
+            self._end_program("the operator moves")
             self._axes[:] = np.sign(axes) * beyond / (1 - DEAD_BAND)
+
+    def start(self, program: Program) -> None:
+        """Let a program move the reference from now on."""
+        self.interrupt()
+        self.program, self.program_ended = program, ""
 
     def reset(self, reference: Floats) -> None:
         """Continue from another reference (n,) [m or rad], at the start of a new run."""
@@ -121,7 +134,7 @@ class OperatorInput:
 
     def stop(self, reason: str) -> None:
         """Stop motion until `enable`."""
-        self.interrupt()
+        self.interrupt(reason)
         self.stopped_by = reason
 
     def enable(self) -> None:
@@ -132,11 +145,11 @@ class OperatorInput:
     def interrupt(self, reason: str = "") -> None:
         """Rest until the operator has let go of the input device; `reason` is shown."""
         if self.is_moving or not reason:
-            self.rested_by = reason
+            self.rested_by = "" if self.program else reason
         self.must_release = True
         self._axes[:] = 0
         self._velocity[:] = 0
-        self.program = None
+        self._end_program(reason)
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The reference (n,) [m or rad] of a control tick.
@@ -148,9 +161,9 @@ class OperatorInput:
             is_held: Whether the supervisor holds motion.
         """
         if is_held or self.stopped_by:
-            self.interrupt()
+            self.interrupt("the supervisor holds motion" if self.program else "")
         elif not self.is_present(now):
-            self.interrupt(f"no accepted command for {COMMAND_TIMEOUT:g} s")
+            self.interrupt(f"no accepted command for {self._timeout:g} s")
         elif self.program is not None:
             self.reference = self.program.advance(period)
             if self.program.is_over:
@@ -158,6 +171,13 @@ class OperatorInput:
         else:
             self._integrate(period, command)
         return self.reference.copy()
+
+    def _end_program(self, reason: str) -> None:
+        if (program := self.program) is not None:
+            share = f"{program.elapsed / program.duration:.0%}"
+            early = f" ended early, at {share}{': ' if reason else ''}{reason}"
+            self.program_ended = program.name + (": done" if program.is_over else early)
+        self.program = None
 
     def _integrate(self, period: float, command: Floats) -> None:
         target = self._axes * self.scale * self._speed * self.is_coupled

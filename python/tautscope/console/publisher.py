@@ -31,12 +31,14 @@ class Bands:
         estimate: State estimate.
         predicted: Predicted state.
         reference: Reference.
+        uncompensated: The tip without compensation.
         found: Which bands were found.
     """
 
     estimate: Floats
     predicted: Floats
     reference: Floats
+    uncompensated: Floats
     found: tuple[bool, bool]
 
 
@@ -116,6 +118,8 @@ class Publisher:
             overlay.predicted = self._outlines(bands.predicted)
             overlay.tip = self._tip(bands.estimate)
             overlay.target = self._tip(bands.reference)
+            overlay.uncompensated = self._outlines(bands.uncompensated)
+            overlay.uncompensated_tip = self._tip(bands.uncompensated)
         return overlay
 
     def _outlines(self, state: Floats) -> list[list[tuple[float, float]]]:

@@ -98,7 +98,10 @@ class Session:
             sequence = self._control.images.add(arrived_at)
             detection = report.detection
             found = (False, False) if detection is None else detection.found
-            bands = Bands(report.state_estimate, report.predicted_state, run.reference, found)
+            without = run.uncompensated_at(report.captured_at)
+            bands = Bands(
+                report.state_estimate, report.predicted_state, run.reference, without, found
+            )
             self._publisher.submit(Update(sequence, frame, arrived_at, bands))
         if self._control.config.dof and (picture := run.sample.frame) is not None:
             self._layout.checked(picture.image)

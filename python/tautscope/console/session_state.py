@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tautscope.console.control_run import ControlRun
 from tautscope.console.messages import LONGEST_REASON
 from tautscope.console.rig_control import RigControl
@@ -42,6 +40,7 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     state.lease, state.holder = lease.number, lease.holder
     if program is not None:
         state.program, state.progress = program.name, program.elapsed / program.duration
+    state.program_ended = operator.program_ended
     state.is_recording = control.is_recording
     state.refused = dict(operator.refused)
     state.stopped_at = control.stopped_at
@@ -63,13 +62,9 @@ def _add_run(state: State, run: ControlRun) -> None:
     state.time = sample.time
     state.command = values(run.command)
     state.applied = values(sample.applied)
-    # Between images `paper` has no estimate of the tip: its predicted state is the model's alone.
-    if state.profile == "best":
-        state.tip = values(loop.predicted_state)
-    elif report is None:
-        state.tip = (None,) * len(state.tip)
-    else:
-        state.tip = known(np.where(report.observable, report.state_estimate, np.nan))
+    state.tip = known(run.tip)
+    state.uncompensated = values(run.uncompensated)
+    state.uncompensated_by, state.score = run.uncompensated_by, run.score.errors
     state.delta_minus, state.delta_plus = values(loop.delta_minus), values(loop.delta_plus)
     if (hysteresis := loop.hysteresis) is not None:
         state.width_std = known(2 * hysteresis.width_std)

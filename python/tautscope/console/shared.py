@@ -35,6 +35,8 @@ class Overlay(msgspec.Struct):
         predicted: Outlines of the bands that the model predicted.
         tip: Centre of the distal band where the tip is estimated; None if not known.
         target: The same where the reference is.
+        uncompensated: Outlines of the bands where they would be without compensation.
+        uncompensated_tip: The centre of the distal one.
     """
 
     sequence: int
@@ -45,6 +47,8 @@ class Overlay(msgspec.Struct):
     predicted: list[list[tuple[float, float]]] = []
     tip: tuple[float, float] | None = None
     target: tuple[float, float] | None = None
+    uncompensated: list[list[tuple[float, float]]] = []
+    uncompensated_tip: tuple[float, float] | None = None
 
 
 class SharedMemory:

@@ -107,11 +107,13 @@ class Positions(Struct):
         reference: Where the reference is.
         tip: The estimated tip; None if not known.
         true: The true tip, in simulations.
+        uncompensated: The tip without compensation; None if not known.
     """
 
     reference: Values | None
     tip: Values | None
     true: Values | None
+    uncompensated: Values | None
 
 
 class State(Struct):
@@ -126,6 +128,9 @@ class State(Struct):
         reference, command, applied, delta_minus, delta_plus: (n,).
         tip: (n,) estimated; in profile ``paper`` that of the newest image, if this determined it.
         true: (n,) true tip, in simulations without an image of it.
+        uncompensated: (n,) tip without compensation.
+        uncompensated_by: By what that is known.
+        score: (n,) as `Score.errors`.
         positions: For the side view, where a kinematics has positions.
         width_std: (n,) standard deviations of the slack's width.
         reaction: The supervisor's reaction in force.
@@ -143,6 +148,7 @@ class State(Struct):
         holder: Connection that holds it.
         program: Motion that runs by itself; empty if none.
         progress: Its progress, 0 to 1.
+        program_ended: How the last one ended; empty before one has.
         is_recording: Whether a take is being recorded.
         refused: Reason -> number of refused commands.
         image: The newest image.
@@ -150,6 +156,7 @@ class State(Struct):
         late: Number of control ticks that came late, and all of them.
         stopped_at: When the newest STOP took effect [s, monotonic clock].
         drives: The drives' state, in words.
+        replay: Time and duration of a recording [s], and whether it plays; None if live.
     """
 
     mode: Mode
@@ -165,6 +172,9 @@ class State(Struct):
     delta_minus: Values = ()
     delta_plus: Values = ()
     true: Values | None = None
+    uncompensated: Known = ()
+    uncompensated_by: str = ""
+    score: list[tuple[float, float] | None] = field(default_factory=list)
     positions: Positions | None = None
     width_std: Known = ()
     reaction: str = "none"
@@ -181,6 +191,7 @@ class State(Struct):
     holder: int | None = None
     program: str = ""
     progress: float = 0.0
+    program_ended: str = ""
     is_recording: bool = False
     refused: dict[str, int] = field(default_factory=dict)
     image: ImageState = field(default_factory=ImageState)
@@ -188,6 +199,7 @@ class State(Struct):
     late: tuple[int, int] = (0, 0)
     stopped_at: float | None = None
     drives: str = ""
+    replay: tuple[float, float, bool] | None = None
 
 
 def blank_state(mode: Mode, config: Config) -> State:
@@ -196,6 +208,8 @@ def blank_state(mode: Mode, config: Config) -> State:
     state = State(mode, config.profile)
     state.reference = state.command = state.applied = state.tip = (0.0,) * count
     state.delta_minus = state.delta_plus = (0.0,) * count
+    state.uncompensated = (None,) * count
+    state.score = [None] * count
     state.width_std = state.image.deviation = (None,) * count
     state.scale, state.clutch = (0.4,) * count, (True,) * count
     return state
@@ -211,7 +225,8 @@ def show_truth(state: State, true: ArrayLike | None, kinematics: Kinematics | No
     state.true = None if true is None else values(true)
     if kinematics is not None:
         truth = None if state.true is None else position(state.true)
-        state.positions = Positions(position(state.reference), position(state.tip), truth)
+        without = position(state.uncompensated)
+        state.positions = Positions(position(state.reference), position(state.tip), truth, without)
 
 
 def values(of: ArrayLike) -> Values:

@@ -12,8 +12,10 @@ from threading import Event, Thread
 from typing import IO, Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
 from tautscope.errors import OutputError
 from tautscope.log import messages as msg
 from tautscope.log import topics
@@ -40,7 +42,7 @@ class Journal:
     Attributes:
         events: Index, time [s] and the arguments of `Codec.tick`, `Codec.update` or
             `request_messages`.
-        images: Index, time [s], capture time [s], pixels.
+        images: Index, time [s], capture time [s], pixels, format.
         warnings: Time [s] or None, and text.
         clock: Set at the loop's first call.
         dropped: Number of dropped ticks, updates and requests.
@@ -55,16 +57,19 @@ class Journal:
     def __init__(self, path: Path, info: RunInfo, on_warning: Callable[[str], None]) -> None:
         self.path = path
         self.events: deque[tuple[int, float, tuple[Any, ...]]] = deque()
-        self.images: deque[tuple[int, float, float, NDArray[np.uint8]]] = deque()
+        self.images: deque[tuple[int, float, float, NDArray[np.uint8], ImageFormat]] = deque()
         self.warnings: deque[tuple[float | None, str]] = deque()
-        self._encoded_images: deque[tuple[int, float, float, bytes]] = deque()
+        self._encoded_images: deque[tuple[int, float, float, bytes, str]] = deque()
         self.clock: msg.Clock | None = None
         self.dropped = self.dropped_images = 0
         self.failure = ""
         self._on_warning = on_warning
         self._settings = info.config.recording
         self._messages = msg.Codec(info.config)
-        self._codec = ImageCodec(info.config.camera, self._settings)
+        self._codecs: dict[ImageFormat, ImageCodec] = {
+            kind: ImageCodec(info.config.camera, replace(self._settings, image_format=kind))
+            for kind in IMAGE_FORMATS
+        }
         self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
         self._file = _open(path)
         self._log = _begin(path, self._file, info)
@@ -171,10 +176,10 @@ class Journal:
     def _write_images(self, file: McapFile) -> None:
         """Write the images, and after each one the events, which are quicker to write."""
         while self._encoded_images:
-            index, now, captured_at, data = self._encoded_images.popleft()
+            index, now, captured_at, data, name = self._encoded_images.popleft()
             clock = self.clock
             assert clock is not None
-            message = msg.image_message(clock, captured_at, self._codec.format, data)
+            message = msg.image_message(clock, captured_at, name, data)
             file.add(topics.IMAGE, message, index, clock.nanoseconds(now))
             self._write_events(file)
 
@@ -189,9 +194,11 @@ class Journal:
                     break
                 time.sleep(POLL_PERIOD)
                 continue
-            index, now, captured_at, image = self.images[0]
+            index, now, captured_at, image, kind = self.images[0]
+            codec = self._codecs[kind]
             try:
-                self._encoded_images.append((index, now, captured_at, self._codec.encode(image)))
+                data = codec.encode(image)
+                self._encoded_images.append((index, now, captured_at, data, codec.format))
             except Exception as error:  # an invalid image is dropped; the recording goes on
                 self.dropped_images += 1
                 if not has_warned:

@@ -95,6 +95,9 @@ class LogWriter:
         on_warning: Called from a background thread, once per kind of problem; by default the
             package's logger warns.
 
+    Attributes:
+        image_format: Of the next images; `recording.image_format` at first, may be set.
+
     Raises:
         OutputError: The file exists already, or cannot be created or written.
     """
@@ -110,6 +113,7 @@ class LogWriter:
         on_warning: Callable[[str], None] = _LOG.warning,
     ) -> None:
         self._settings = config.recording
+        self.image_format = config.recording.image_format
         self._wait = wait
         self._ticks = self._updates = self._index = 0
         info = RunInfo(config, compensate, tuple(segments))
@@ -152,7 +156,8 @@ class LogWriter:
         if not self._has_room(journal.images, self._settings.queue_images):
             journal.dropped_images += 1
             return
-        journal.images.append((self._index, now, frame.captured_at, frame.image.copy()))
+        image = frame.image.copy()
+        journal.images.append((self._index, now, frame.captured_at, image, self.image_format))
 
     def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
         """Record an update by another sensor, after the tick whose sample has the measurement.

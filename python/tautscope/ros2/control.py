@@ -240,9 +240,7 @@ class NodeControl:
             # The detector is made and used now, because its first use is slow.
             blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
             run.loop.prepare_detection(Frame(blank, sample.time, 0))()
-        share = float(self.parameters["compensation"])
-        if share != 1:
-            run.loop.set_compensation(share)
+        run.set_compensation(float(self.parameters["compensation"]))
         self.run = run
 
     def _add_measurements(self, run: ControlRun) -> None:

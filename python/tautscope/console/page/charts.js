@@ -1,150 +1,88 @@
-// Per degree of freedom: reference and tip over time, the loop, the offsets; with uPlot.
+// Per degree of freedom: reference and tip over time, the loops with and without compensation, the offsets.
 
-const DEGREES = 180 / Math.PI;
-const SHOWN = { mm: { scale: 1000, unit: "mm" }, rad: { scale: DEGREES, unit: "°" } };
+import { ends, plot } from "./plot.js";
+
+const SHOWN = { mm: { scale: 1000, unit: "mm", size: 2, digits: 2 }, rad: { scale: 180 / Math.PI, unit: "°", size: 6, digits: 1 } };
 const LENGTH = 600; // samples
 const SAMPLE = 0.04; // s
+const GAP = 1; // s without a sample: another time of a recording
 const FRAME = 40; // ms; one degree of freedom is drawn in each
-
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-
-/** The loop: tip over reference, as a path. */
-function xyPath(plot, index) {
-  const path = new Path2D();
-  uPlot.orient(plot, index, (series, xs, ys, scaleX, scaleY, toX, toY, left, top, width, height) => {
-    let isFirst = true;
-    for (let k = 0; k < xs.length; k++) {
-      const x = toX(xs[k], scaleX, width, left);
-      const y = toY(ys[k], scaleY, height, top);
-      if (isFirst) path.moveTo(x, y);
-      else path.lineTo(x, y);
-      isFirst = false;
-    }
-  });
-  return { stroke: path };
-}
-
-class DofCharts {
-  constructor(dof, parent) {
-    this.dof = dof;
-    const card = document.createElement("article");
-    card.className = "dof";
-    const { unit, scale, range } = dof;
-    const ends = range?.map((end) => `${Math.round(scale * end)}`.replace("-", "−")).join(" to ");
-    card.innerHTML = `<h2><b>${dof.name}</b>${ends ? `<span class="range">${ends} ${unit}</span>` : ""}
-      error <b class="error"></b><span class="offsets"></span></h2>`;
-    this.error = card.querySelector(".error");
-    this.offsets = card.querySelector(".offsets");
-    this.boxes = [
-      ["over time: reference, command and tip",
-        `<span class="reference">reference</span> <span class="command">command</span> <span class="tip">tip</span> <span class="true" hidden>true tip</span> [${unit}]`],
-      ["loop of tip over reference", `<span class="tip">tip</span> over reference [${unit}]`],
-      ["contact offsets over time", `<span class="offset">contact offsets</span> [${unit}]`],
-    ].map(([what, caption]) => {
-      const box = document.createElement("div");
-      box.className = "chart";
-      box.setAttribute("role", "img");
-      box.setAttribute("aria-label", `${dof.name}, ${what}`);
-      box.innerHTML = `<p aria-hidden="true">${caption}</p>`;
-      card.append(box);
-      return box;
-    });
-    parent.append(card);
-    this.plots = [];
-  }
-
-  rebuild() {
-    this.plots.forEach((plot) => plot.destroy());
-    const line = (name, width = 1.5) => ({ label: name, stroke: colour(name), width, points: { show: false } });
-    const letter = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
-    const axis = () => ({
-      stroke: colour("dim"), grid: { stroke: colour("line"), width: 0.5 }, ticks: { show: false }, size: 2 * letter,
-      font: `${letter}px system-ui`, gap: 2, space: 3.5 * letter,
-    });
-    const vertical = () => ({ ...axis(), size: 3.6 * letter, space: 2.2 * letter });
-    const common = (box, title) => ({
-      width: Math.max(box.clientWidth, 40), height: Math.max(box.clientHeight, 40), legend: { show: false },
-      cursor: { show: false }, padding: [1.4 * letter, 6, 0, 0], title,
-    });
-    const least = (size) => (plot, low, high) => {
-      const middle = (low + high) / 2 || 0;
-      const half = Math.max((high - low) * 0.55 || 0, size / 2);
-      return [middle - half, middle + half];
-    };
-    const { scale } = this.dof;
-    const size = this.dof.unit === "mm" ? 2 : 6;
-    const [timeBox, loopBox, offsetBox] = this.boxes;
-    const time = { time: false, range: (plot, low, high) => [high - LENGTH * SAMPLE, high] };
-    this.plots = [
-      new uPlot({
-        ...common(timeBox), scales: { x: time, y: { range: least(size) } }, axes: [axis(), vertical()],
-        series: [{}, line("reference"), line("command", 1), line("tip", 2), line("true", 1)],
-      }, [[], [], [], [], []], timeBox),
-      new uPlot({
-        ...common(loopBox), mode: 2, scales: { x: { time: false, range: least(size) }, y: { range: least(size) } },
-        axes: [axis(), vertical()], series: [null, { ...line("tip", 1.5), paths: xyPath }],
-      }, [null, [[], []]], loopBox),
-      new uPlot({
-        ...common(offsetBox), scales: { x: time, y: { range: least(size) } }, axes: [axis(), vertical()],
-        series: [{}, line("offset"), line("offset")],
-      }, [[], [], []], offsetBox),
-    ];
-    this.scale = scale;
-  }
-
-  draw(times, rows) {
-    const { reference, command, tip, true: truth, minus, plus } = rows;
-    const [time, loop, offsets] = this.plots;
-    time.setData([times, reference, command, tip, truth]);
-    loop.setData([null, [reference, tip]]);
-    offsets.setData([times, minus, plus]);
-  }
-}
+const WITHOUT = { colour: "without", width: 1.5, dash: [5, 3] };
+const TIP = { colour: "tip", width: 2.5 };
+const sign = (name, text) => `<span class="${name}">${text}</span>`;
+const CAPTIONS = [
+  ["reference, command and tip over time", `${sign("reference", "reference")}${sign("command", "command")}${sign("tip", "tip")}${sign("true", "true tip")}`],
+  ["loop of the tip over the reference, with and without compensation", `${sign("tip", "tip")}${sign("without", "without")}`],
+  ["contact offsets over time", sign("offset", "contact offsets")],
+];
 
 /** All charts; `add` samples the states, which are drawn one degree of freedom at a time. */
 export class Charts {
   constructor(parent, dofs) {
-    this.dofs = dofs.map((dof) => ({ ...dof, ...SHOWN[dof.unit] }));
     this.parent = parent;
-    this.cards = this.dofs.map((dof) => new DofCharts(dof, parent));
+    this.dofs = dofs.map((dof) => ({ ...dof, ...SHOWN[dof.unit] }));
+    this.cards = this.dofs.map((dof) => this.#card(dof));
     this.times = [];
-    this.rows = dofs.map(() => ({ reference: [], command: [], tip: [], true: [], minus: [], plus: [] }));
+    const names = ["reference", "command", "tip", "true", "without", "minus", "plus"];
+    this.rows = dofs.map(() => Object.fromEntries(names.map((name) => [name, []])));
     this.next = 0;
-    const rebuild = () => this.cards.forEach((card) => card.rebuild());
-    rebuild(); // the observer first calls when the page is rendered, which a hidden one is not
-    new ResizeObserver(rebuild).observe(parent);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", rebuild);
+    this.#show(0);
     setInterval(() => this.#draw(), FRAME);
   }
 
+  #card({ name, unit, scale, range }) {
+    const card = document.createElement("article");
+    card.className = "dof";
+    const reach = range?.map((end) => `${Math.round(scale * end)}`.replace("-", "−")).join(" to ");
+    card.innerHTML = `<h2><b>${name}</b> error <b class="error"></b>
+      <span class="offsets"></span>${reach ? `<span class="range">${reach} ${unit}</span>` : ""}</h2><p class="score"></p>`;
+    for (const [what, caption] of CAPTIONS) {
+      card.insertAdjacentHTML("beforeend", `<div class="chart"><p aria-hidden="true">${caption} [${unit}]</p>
+        <canvas role="img" aria-label="${name}, ${what}"></canvas></div>`);
+    }
+    this.parent.append(card);
+    return card;
+  }
+
   add(state) {
-    const last = this.times.at(-1) ?? -Infinity;
-    if (state.time < last) this.#clear();
+    const last = this.times.at(-1) ?? state.time - SAMPLE;
+    if (state.time < last || state.time > last + GAP) this.#clear();
     else if (state.time - last < SAMPLE * 0.9) return;
     this.times.push(state.time);
-    if (state.true) this.parent.querySelectorAll(".true").forEach((element) => (element.hidden = false));
-    this.dofs.forEach(({ scale }, k) => {
-      const row = this.rows[k];
-      row.reference.push(scale * state.reference[k]);
-      row.command.push(scale * state.command[k]);
-      row.tip.push(state.tip[k] === null ? null : scale * state.tip[k]);
-      row.true.push(state.true ? scale * state.true[k] : null);
-      row.minus.push(scale * state.delta_minus[k]);
-      row.plus.push(scale * state.delta_plus[k]);
+    this.parent.classList.toggle("knows", state.true !== null);
+    const travel = this.dofs.map(({ scale, size }, k) => {
+      const { reference, command, tip, true: truth, without, minus, plus } = this.rows[k];
+      const shown = (value) => (value === null || value === undefined ? null : scale * value);
+      reference.push(shown(state.reference[k]));
+      command.push(shown(state.command[k]));
+      tip.push(shown(state.tip[k]));
+      truth.push(shown(state.true?.[k]));
+      without.push(shown(state.uncompensated[k]));
+      minus.push(shown(state.delta_minus[k]));
+      plus.push(shown(state.delta_plus[k]));
+      return Math.abs(reference.at(-1) - (reference.at(-2) ?? reference.at(-1))) / size;
     });
+    if (travel[this.shown] === 0 && Math.max(...travel) > 0) this.#show(travel.indexOf(Math.max(...travel)));
     if (this.times.length > LENGTH) [this.times, ...this.rows.flatMap(Object.values)].forEach((list) => list.shift());
+  }
+
+  /** A narrow window has room for one degree of freedom: the one that moves, or moved last. */
+  #show(index) {
+    this.shown = index;
+    this.cards.forEach((card, k) => card.classList.toggle("moved", k === index));
   }
 
   /** Numbers beside the charts. */
   describe(state) {
-    this.dofs.forEach(({ scale, unit }, k) => {
-      const number = (value) => (value === null ? "–" : `${(scale * value).toFixed(unit === "mm" ? 2 : 1)} ${unit}`);
-      const card = this.cards[k];
-      card.error.textContent = state.tip[k] === null ? "–" : number(state.reference[k] - state.tip[k]);
-      const deviation = number(state.image.deviation[k]);
+    this.dofs.forEach(({ scale, unit, digits }, k) => {
+      const number = (value) => (value === null ? "–" : `${(scale * value).toFixed(digits)} ${unit}`.replace("-", "−"));
+      const show = (name, text) => (this.cards[k].querySelector(name).textContent = text);
+      show(".error", state.tip[k] === null ? "–" : number(state.reference[k] - state.tip[k]));
       const slack = state.delta_plus[k] - state.delta_minus[k];
       const certainty = state.width_std[k] === null ? "" : ` ± ${number(state.width_std[k])}`;
-      card.offsets.textContent = `tip ± ${deviation}, slack ${number(slack)}${certainty}`;
+      show(".offsets", `tip ± ${number(state.image.deviation[k])}, slack ${number(slack)}${certainty}`);
+      const score = state.score[k]?.map(number);
+      show(".score", score ? `Last minute: ${score[0]} off; without compensation ${score[1]}` : "Not moved yet");
     });
   }
 
@@ -154,6 +92,21 @@ export class Charts {
 
   #draw() {
     this.next = (this.next + 1) % this.dofs.length;
-    if (this.times.length > 1 && !document.hidden) this.cards[this.next].draw(this.times, this.rows[this.next]);
+    const { times, dofs: { [this.next]: { size } } } = this;
+    if (times.length < 2 || document.hidden) return;
+    const [time, loops, offsets] = this.cards[this.next].querySelectorAll("canvas");
+    const { reference, command, tip, true: truth, without, minus, plus } = this.rows[this.next];
+    const range = [times.at(-1) - LENGTH * SAMPLE, times.at(-1)];
+    plot(time, range, ends([reference, command, tip], size), [
+      { x: times, y: command, colour: "command", width: 1, dash: [1, 2] },
+      { x: times, y: tip, ...TIP },
+      { x: times, y: truth, colour: "true", width: 1 },
+      { x: times, y: reference, colour: "reference", width: 1.2 },
+    ]);
+    plot(loops, ends([reference], size), ends([tip, without], size), [
+      { x: reference, y: without, ...WITHOUT },
+      { x: reference, y: tip, ...TIP },
+    ]);
+    plot(offsets, range, ends([minus, plus], size), [minus, plus].map((y) => ({ x: times, y, colour: "offset", width: 1.5 })));
   }
 }

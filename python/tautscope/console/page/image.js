@@ -1,6 +1,6 @@
 // The endoscope's image with the bands as measured and predicted, the tip, and the reference.
 
-const COLOURS = { measured: "#5dff7a", predicted: "#ffd23e", tip: "#58b9ff", target: "#ffffff" };
+const COLOURS = { measured: "#5dff7a", predicted: "#e6e6e6", tip: "#4fb4ff", target: "#ffffff", without: "#ff9a2e" };
 
 /** Draws the newest image; `onDrawn` gets the sequence of every image that is on the screen, and its width there. */
 export class ImageView {
@@ -59,11 +59,16 @@ export class ImageView {
     context.lineWidth = Math.max(1.5, height / 380);
     this.#outlines(overlay.predicted, COLOURS.predicted, [6, 4]);
     this.#outlines(overlay.measured, COLOURS.measured, []);
-    const { tip, target } = overlay;
+    const { tip, target, uncompensated_tip: without } = overlay;
     const radius = height / 60;
+    if (without && tip && Math.hypot(without[0] - tip[0], without[1] - tip[1]) > radius / 2) {
+      this.#outlines(overlay.uncompensated, COLOURS.without, [], true);
+      this.#line([[without[0] - radius, without[1] - radius], [without[0] + radius, without[1] + radius]], COLOURS.without);
+      this.#line([[without[0] - radius, without[1] + radius], [without[0] + radius, without[1] - radius]], COLOURS.without);
+    }
     if (tip && target) this.#line([tip, target], COLOURS.target);
     if (target) this.#circle(target, radius, COLOURS.target);
-    if (tip) this.#circle(tip, radius / 2.5, COLOURS.tip);
+    if (tip) this.#circle(tip, radius / 2.5, COLOURS.tip, true);
     this.sequence = overlay.sequence;
     this.drawnAt = performance.now();
     this.drawn.push(this.drawnAt);
@@ -84,9 +89,14 @@ export class ImageView {
     return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
   }
 
-  #outlines(outlines, colour, dashes) {
-    this.context.setLineDash(dashes);
-    for (const outline of outlines) this.#line([...outline, outline[0]], colour);
+  #outlines(outlines, colour, dashes, isFilled = false) {
+    const { context } = this;
+    context.setLineDash(dashes);
+    context.fillStyle = `${colour}66`;
+    for (const outline of outlines) {
+      this.#line([...outline, outline[0]], colour);
+      if (isFilled) context.fill();
+    }
     this.context.setLineDash([]);
   }
 
@@ -98,11 +108,12 @@ export class ImageView {
     context.stroke();
   }
 
-  #circle([u, v], radius, colour) {
+  #circle([u, v], radius, colour, isFilled = false) {
     const { context } = this;
-    context.strokeStyle = colour;
+    context.strokeStyle = context.fillStyle = colour;
     context.beginPath();
     context.arc(u, v, radius, 0, 2 * Math.PI);
-    context.stroke();
+    if (isFilled) context.fill();
+    else context.stroke();
   }
 }

@@ -49,6 +49,8 @@ function reply(text, isRefused) {
   $("reply").classList.toggle("refused", isRefused);
 }
 
+/** Go to a time of a recording, or stay, and play on or not. */
+const seek = (time, isPlaying) => control.send({ type: "seek", time, is_playing: isPlaying });
 const stop = () => control.send({ type: "stop" });
 
 const control = new Link("/control", token, {
@@ -59,7 +61,7 @@ const control = new Link("/control", token, {
       if (!layout) build(message.layout);
     } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
-      reply(isAccepted ? `${what}: done` : `${what}: refused, ${reason}`, !isAccepted);
+      reply(`${what}: ${isAccepted ? "done" : "refused"}${reason && `, ${reason}`}`, !isAccepted);
     } else {
       state = { ...message.state, latency: message.latency };
       receivedAt = performance.now();
@@ -80,7 +82,17 @@ const updates = []; // time and number of updates, of the newest states
 
 // Controls
 
-$("stop").addEventListener("click", stop);
+// At once when it is touched; a click without a pointer is a key's.
+$("stop").addEventListener("pointerdown", stop);
+$("stop").addEventListener("click", (event) => event.detail || stop());
+$("play").addEventListener("click", () => {
+  const [time, duration, isPlaying] = state.replay;
+  seek(!isPlaying && time >= duration - 0.1 ? 0 : null, !isPlaying);
+});
+$("seek").addEventListener("input", () => seek(Number($("seek").value), state.replay[2]));
+addEventListener("keydown", (event) => {
+  if (event.code === "KeyC" && !event.repeat && !isText(event.target) && !event.ctrlKey && !event.metaKey) $("compensate").click();
+});
 $("take").addEventListener("click", () => control.send({ type: "take" }));
 $("acknowledge").addEventListener("click", () => request({ type: "action", name: "acknowledge" }));
 for (const button of document.querySelectorAll("[data-action]")) {
@@ -155,7 +167,7 @@ function facts() {
     drives: state.drives,
     "late ticks": late[1] ? `${late[0]} of ${late[1]}` : "–",
     "commands refused": refused,
-    log: log.failure || `${megabytes(log.size)}, room for ${duration(log.remaining)}`,
+    log: log.failure || `${log.path}, ${megabytes(log.size)}, room for ${duration(log.remaining)}`,
     "not logged": log.dropped,
   };
   $("facts").innerHTML = Object.keys(list).map(() => "<div><dt></dt><dd></dd></div>").join("");
@@ -207,6 +219,11 @@ function showControls() {
   $("record").setAttribute("aria-pressed", state.is_recording);
   $("progress").hidden = !state.program;
   $("progress").value = state.progress;
+  $("program").textContent = state.program ? `${state.program}: ${Math.round(100 * state.progress)} %` : state.program_ended;
+  const shares = state.score.map((errors) => (errors ? `${Math.round(100 * (1 - errors[0] / errors[1]))} %` : "–")).join(", ");
+  $("score").textContent = state.score.some(Boolean)
+    ? `Last minute: ${shares} less error than without (by ${state.uncompensated_by}).`
+    : "Move for a second to compare with the tip without compensation.";
   $("enable").disabled ||= !["stopped", "held", "off"].includes(state.motion);
   $("hint").textContent = hint();
 }
@@ -220,8 +237,18 @@ function hint() {
   if (isText(document.activeElement)) return "Keys write into the text field; click beside it to steer by them.";
   if (state.must_release) return "Let go of all keys and buttons, then hold one to move.";
   const pick = rows.length > 3 ? ` Keys 3 to ${rows.length}, or the pad's cross, pick what W S and the right stick move.` : "";
-  const touch = matchMedia("(any-pointer: coarse), (max-width: 700px)").matches ? "Hold − or +, or hold" : "Hold";
-  return `${touch} a key, or a shoulder button of the gamepad and its sticks, to move. Escape stops.${pick}`;
+  return `Hold a key, − or +, or a shoulder button of the gamepad and its sticks, to move. Escape stops.${pick}`;
+}
+
+function showTime() {
+  $("timeline").hidden = !state.replay;
+  $("controls").hidden = Boolean(state.replay);
+  if (!state.replay) return;
+  const [time, length, isPlaying] = state.replay;
+  $("seek").max = length;
+  show($("seek"), time);
+  $("at").textContent = `${time.toFixed(1)} of ${length.toFixed(1)} s`;
+  $("play").textContent = isPlaying ? "Pause" : "Play";
 }
 
 function update() {
@@ -236,7 +263,7 @@ function update() {
   if (!layout) return;
   const hasImage = layout.sees_bands || view.sequence > 0;
   const isOld = performance.now() - view.drawnAt > LOST;
-  $("stale").hidden = !isOld || !hasImage;
+  $("stale").hidden = !isOld || !hasImage || (!isLost && state.replay !== null && !state.replay[2]);
   if (isLost) {
     $("message").textContent = "No data from the control process. Motion has stopped; use the emergency stop if not.";
     return;
@@ -250,6 +277,7 @@ function update() {
   showWarnings();
   showLease();
   showControls();
+  showTime();
   facts();
 }
 setInterval(update, 100);

@@ -4,7 +4,7 @@ const SAMPLE = 0.04; // s
 const LENGTH = 600; // samples
 const FRAME = 100; // ms
 const LEAST = 0.02; // m, shown across at least
-const COLOURS = { reference: "#9aa3ad", true: "#5dff7a", tip: "#58b9ff" };
+const COLOURS = { reference: "#ffffff", uncompensated: "#ff9a2e", true: "#5dff7a", tip: "#4fb4ff" };
 const SIDES = [["x", 0], ["y", 1]]; // over z
 
 export class PathView {
@@ -71,10 +71,12 @@ export class PathView {
     for (const [kind, colour] of Object.entries(COLOURS)) {
       context.strokeStyle = context.fillStyle = colour;
       context.lineWidth = 1.2;
+      context.setLineDash(kind === "uncompensated" ? [5, 3] : []);
       context.globalAlpha = 0.7;
       context.beginPath();
       for (const each of this.path) if (each[kind]) context.lineTo(...place(each[kind]));
       context.stroke();
+      context.setLineDash([]);
       context.globalAlpha = 1;
       const now = this.path.at(-1)[kind];
       if (!now) continue;
