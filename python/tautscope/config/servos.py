@@ -80,7 +80,7 @@ def with_servo_defaults(drives: dict[str, Any]) -> dict[str, Any]:
 
 def _with_defaults(axis: dict[str, Any], model: ServoModel, dof: Dof) -> dict[str, Any]:
     radian = {} if dof is Dof.INSERTION else {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)}
-    filled = {"sign": 1, **radian, **axis}
+    filled = {**radian, **axis}
     counts = filled.get("counts_per_unit")
     if not isinstance(counts, int | float) or counts <= 0:
         return filled  # refused when it is checked
@@ -88,6 +88,5 @@ def _with_defaults(axis: dict[str, Any], model: ServoModel, dof: Dof) -> dict[st
     return {
         "speed_limit": turns * COUNTS_PER_TURN / counts,
         "following_error": _FOLLOWING_ERROR / counts,
-        "following_window": _FOLLOWING_ERROR / 2 / counts,
         **filled,
     }
