@@ -29,13 +29,21 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from bench.processes import Rig
-from tautscope.config import DrivesConfig, dump_config, load_config
+from tautscope.config import (
+    Config,
+    DrivesConfig,
+    dump_config,
+    from_document,
+    load_config,
+    to_document,
+)
+from tautscope.dof import Dof
 from tautscope.errors import DriveError
 from tautscope.hardware.drives import Drives, open_drives
 
 BENCH = "bench"
-SPEED = np.array([0.01, 1.5, 0.8])
-"""Largest speed of the motors [m/s, rad/s, rad/s]."""
+SPEEDS = {"mm": 0.01, "rad": 1.5}
+"""Largest speed of a motor [m/s, rad/s], by its unit in tables."""
 FAULTS: dict[str, tuple[str, float | None]] = {
     "drop": ("a drive silent", 100.0),
     "delay": ("a drive answers 0.3 s late", 100.0),
@@ -52,10 +60,10 @@ STOPS = {"canopen": "quick stop active", "dynamixel": "bus watchdog", "serial": 
 
 
 @contextmanager
-def simulated_drives(folder: Path, bench: str) -> Iterator[tuple[Path, Rig]]:
+def simulated_drives(folder: Path, bench: Config) -> Iterator[tuple[Path, Rig]]:
     """Start the simulated motors; yield the configuration file, and their process."""
     file = folder / "rig.toml"
-    config = load_config(bench).replace(**{"drives.channel": str(folder / "bus")})
+    config = bench.replace(**{"drives.channel": str(folder / "bus")})
     file.write_text(dump_config(config), encoding="utf-8")
     command = [sys.executable, "-m", "tautscope.bench.any_motors", "--config", str(file)]
     with subprocess.Popen(
@@ -65,6 +73,19 @@ def simulated_drives(folder: Path, bench: str) -> Iterator[tuple[Path, Rig]]:
         drives.event("ready")
         yield file, drives
         process.communicate()
+
+
+def with_motors(bench: Config, count: int) -> Config:
+    """A robot of so many motors, each as that of rotation on the bench."""
+    document = to_document(bench)
+    names = [f"joint_{number}" for number in range(1, count + 1)]
+    drives = document["drives"]
+    own = drives["rotation"]
+    for dof in Dof:
+        del drives[dof.label]
+    drives["motors"] = {name: own | {"node": at} for at, name in enumerate(names, start=1)}
+    document["dof"] = [{"name": name, "width_limit": 1.0} for name in names]
+    return from_document(document)
 
 
 def drives_config(file: Path) -> DrivesConfig:
@@ -77,13 +98,14 @@ def drives_config(file: Path) -> DrivesConfig:
 def stream(drives: Drives, seconds: float, begin: np.ndarray) -> list[float]:
     """Send set-points at the rate of the drives; return the duration of each exchange [ms]."""
     took = []
+    speed = np.array([SPEEDS[motor.display_unit] for motor in drives.config.all_motors])
     start = time.monotonic()
     for count in range(round(seconds / drives.cycle)):
         due = start + count * drives.cycle
         time.sleep(max(0.0, due - time.monotonic()))
         phase = 2 * np.pi * 0.5 * count * drives.cycle
         before = time.perf_counter()
-        drives.exchange(begin + SPEED / np.pi * np.sin(phase))
+        drives.exchange(begin + speed / np.pi * np.sin(phase))
         took.append((time.perf_counter() - before) * 1e3)
     return took
 
@@ -93,9 +115,11 @@ def last_stop(process: Rig, stops: int, what: str) -> float:
     return max(process.event(what) for _ in range(stops))
 
 
-def stop_times(kind: str, repeats: int, bench: str) -> list[float]:
+def stop_times(kind: str, repeats: int, bench: Config) -> list[float]:
     """Return the times from a fault to the stop [ms], see above."""
     times = []
+    assert bench.drives is not None
+    motors = bench.drives.all_motors
     for _ in range(repeats):
         with (
             tempfile.TemporaryDirectory() as folder,
@@ -105,24 +129,26 @@ def stop_times(kind: str, repeats: int, bench: str) -> list[float]:
                 with open_drives(drives_config(file)) as drives:
                     begin = drives.start()
                     stream(drives, 0.3, begin)
-                    process.request(f"{kind} rotation")
+                    process.request(f"{kind} {motors[1].label}")
                     try:
                         stream(drives, 10.0, drives.last_command)
                     finally:
                         stopped = time.monotonic()
             except DriveError:
                 began = process.event(f"fault: {kind}")
-                if bench == BENCH:
-                    stopped = last_stop(process, 2, STOPS["canopen"])
+                if bench.drives.protocol == "canopen":
+                    stopped = last_stop(process, len(motors) - 1, STOPS["canopen"])
                 times.append((stopped - began) * 1e3)
             else:
                 raise RuntimeError(f"the fault {kind!r} was not detected")
     return times
 
 
-def killed_times(number: int, repeats: int, bench: str, stop: str) -> list[float]:
+def killed_times(number: int, repeats: int, bench: Config, stop: str) -> list[float]:
     """Return the times from a signal to the controller to the stop of all drives [ms]."""
     times = []
+    assert bench.drives is not None
+    count = len(bench.drives.all_motors)
     for _ in range(repeats):
         with (
             tempfile.TemporaryDirectory() as folder,
@@ -136,7 +162,7 @@ def killed_times(number: int, repeats: int, bench: str, stop: str) -> list[float
                 master.stdout.readline()
                 began = time.monotonic()
                 master.send_signal(number)
-                times.append((last_stop(process, 3, stop) - began) * 1e3)
+                times.append((last_stop(process, count, stop) - began) * 1e3)
     return times
 
 
@@ -165,7 +191,7 @@ def row(what: str, unit: str, values: list[float], goal: float | None) -> dict[s
     }
 
 
-def streaming_rows(seconds: float, bench: str) -> list[dict[str, Any]]:
+def streaming_rows(seconds: float, bench: Config) -> list[dict[str, Any]]:
     with (
         tempfile.TemporaryDirectory() as folder,
         simulated_drives(Path(folder), bench) as (file, _),
@@ -173,7 +199,7 @@ def streaming_rows(seconds: float, bench: str) -> list[dict[str, Any]]:
     ):
         took = stream(drives, seconds, drives.start())
         traffic = drives.statistics
-    answers = 3 * traffic.cycles
+    answers = len(traffic.lost) * traffic.cycles
     return [
         row("set-point to answer, 100 Hz", "ms", took, None),
         row("answers lost", "answers", [float(sum(traffic.lost))], 0.0) | {"n": answers},
@@ -188,6 +214,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--config", default=BENCH, help="bench, bench_dynamixel, ... [bench]")
+    parser.add_argument("--motors", type=int, help="of a robot with so many, in place of three")
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--realtime", action="store_true")
@@ -198,8 +225,11 @@ def main() -> None:
     if arguments.follow:
         follow(arguments.follow)
         return
-    bench, repeats = arguments.config, arguments.repeats
-    protocol = load_config(bench).drives.protocol
+    bench, repeats = load_config(arguments.config), arguments.repeats
+    if arguments.motors is not None:
+        bench = with_motors(bench, arguments.motors)
+    assert bench.drives is not None
+    protocol = bench.drives.protocol
     rows = streaming_rows(arguments.seconds, bench)
     is_cia_402 = protocol == "canopen"
     # A controller that is told to end holds motors on a line where they are, without an event.

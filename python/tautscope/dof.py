@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, Self
 
 
 class Dof(IntEnum):
@@ -29,6 +29,11 @@ class Dof(IntEnum):
         """Factor from m or rad to `display_unit`."""
         return 1e3 if self is Dof.INSERTION else 1.0
 
+    @property
+    def key(self) -> str:
+        """The section of its motor in a configuration."""
+        return f"drives.{self.label}"
+
 
 class NamedDof(Protocol):
     """A degree of freedom by name and unit: `Dof`, or an entry of [[dof]]."""
@@ -47,6 +52,43 @@ class NamedDof(Protocol):
     def display_scale(self) -> float:
         """Factor from m or rad to `display_unit`."""
         ...
+
+
+class NamedMotor(int):
+    """A motor of ``[drives.motors]``; its value is its index in every array of motors."""
+
+    _label: str
+    _unit: str
+
+    def __new__(cls, index: int, label: str, unit: str) -> Self:
+        """Make it of index, name, and unit of its positions."""
+        self = super().__new__(cls, index)
+        self._label, self._unit = label, unit
+        return self
+
+    @property
+    def label(self) -> str:
+        """The name in configurations, columns and tables."""
+        return self._label
+
+    @property
+    def display_unit(self) -> str:
+        """The unit in tables and figures: mm for m, else its own."""
+        return "mm" if self._unit == "m" else self._unit
+
+    @property
+    def display_scale(self) -> float:
+        """Factor from its unit to `display_unit`."""
+        return 1e3 if self._unit == "m" else 1.0
+
+    @property
+    def key(self) -> str:
+        """Its section in a configuration."""
+        return f"drives.motors.{self._label}"
+
+
+Motor = Dof | NamedMotor
+"""A motor by index, name and unit."""
 
 
 def display_text(values: Iterable[float], dofs: Iterable[NamedDof] = Dof) -> str:

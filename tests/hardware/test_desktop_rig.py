@@ -16,7 +16,7 @@ from tautscope.cli import main
 from tautscope.config import Config, load_config
 from tautscope.config.servos import COUNTS_PER_TURN, MODELS
 from tautscope.dof import Dof
-from tautscope.hardware.rig import require_drives
+from tautscope.hardware.motor_rig import require_drives
 from tautscope.log.reader import read_log
 from test_servo_bench import running_bench, slow_config
 

@@ -19,7 +19,7 @@ from tautscope.cli import main
 from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.hardware import jog
-from tautscope.hardware.rig import require_drives
+from tautscope.hardware.motor_rig import require_drives
 from tautscope.hardware.scale import Scale
 
 PAGE = (ROOT / "docs" / "hardware.md").read_text(encoding="utf-8")

@@ -24,7 +24,8 @@ from tautscope.console.rig_control import RigControl
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.experiment import run_on_hardware
-from tautscope.hardware.rig import HardwareRig, require_drives
+from tautscope.hardware.motor_rig import require_drives
+from tautscope.hardware.rig import HardwareRig
 from tautscope.runs.recording import per_dof
 from test_bench import RUN
 from test_processes import Lines, process

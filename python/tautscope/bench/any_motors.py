@@ -24,7 +24,6 @@ from tautscope.bench.requests import read_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
 from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
-from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.signals import exit_on_signals
 
@@ -45,7 +44,7 @@ def make_motors(
         config: ``channel`` names the socket of the bus, or the link to the pseudo-terminal.
         resources: Closes the bus.
         on_cycle: The plant; without it, the motors follow ideally.
-        start: Positions (3,) [m, rad, rad].
+        start: Positions (n,) [m or rad].
         modes: Supported modes of operation of CiA 402 drives.
 
     Raises:
@@ -73,12 +72,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--config", required=True, help="TOML with a section [drives]")
     parser.add_argument("--modes", type=int, nargs="+", default=[7, 8])
-    parser.add_argument("--start", type=float, nargs=3, default=[0.0, 0.0, 0.0])
+    parser.add_argument("--start", type=float, nargs="+", help="position of each motor [0]")
     arguments = parser.parse_args()
     config = load_config(arguments.config).drives
     if config is None:
         raise ConfigError("drives", None, "a section [drives]")
-    start, modes = np.array(arguments.start), tuple(arguments.modes)
+    named = {motor.label: motor for motor in config.all_motors}
+    start, modes = np.array(arguments.start or [0.0] * len(named)), tuple(arguments.modes)
     with exit_on_signals(), ExitStack() as resources:
         with make_motors(config, resources, start=start, modes=modes) as motors:
             printer = EventPrinter(lambda: motors.events)
@@ -86,8 +86,8 @@ def main() -> None:
             with suppress(KeyboardInterrupt):
                 for line in read_requests():
                     kind, label = line.split()
-                    dof = Dof[label.upper()]
-                    motors.clear(dof) if kind == "clear" else motors.inject(kind, dof)  # type: ignore[arg-type]
+                    motor = named[label]
+                    motors.clear(motor) if kind == "clear" else motors.inject(kind, motor)  # type: ignore[arg-type]
         printer.close()
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from tautscope.bench.canopen_node import OUT_OF_RANGE, CanopenNode, Key, Send
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.hardware.cia402 import Mode, State
 from tautscope.hardware.scale import Scale
 
@@ -43,7 +43,7 @@ class SimulatedDrive(CanopenNode):
 
     def __init__(
         self,
-        dof: Dof,
+        dof: Motor,
         config: DrivesConfig,
         send: Send,
         log: Callable[[float, str], None],

@@ -1,4 +1,4 @@
-"""Three simulated CiA 402 drives that move a plant, with fault injection.
+"""Simulated CiA 402 drives that move a plant, with fault injection.
 
 with Hub(path), LocalBus(path) as bus, SimulatedDrives(bus, truth, plant) as drives: ...
 """
@@ -19,7 +19,7 @@ from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.hardware.cia402 import State
 
 FaultKind = Literal["drop", "delay", "fault", "freeze", "heartbeat", "refuse"]
@@ -29,13 +29,13 @@ operation."""
 
 
 class SimulatedDrives(SimulatedMotors[FaultKind]):
-    """Three drives on one bus.
+    """Drives on one bus.
 
     Args:
         bus: The bus; it stays open.
         config: The true rig: units, signs, node ids.
         on_sync: The plant; without it, the motors follow ideally.
-        start: (3,) positions at power-on [m, rad, rad].
+        start: (n,) positions at power-on [m or rad].
         modes: Supported modes of operation; (7,) as the article's drives.
         absent: Indices of objects that they lack.
     """
@@ -50,7 +50,7 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
         modes: tuple[int, ...] = (7, 8),
         absent: tuple[int, ...] = (),
     ) -> None:
-        super().__init__(get_args(FaultKind))
+        super().__init__(config, get_args(FaultKind))
         self._bus = bus
         self._on_sync = on_sync
         self._delayed: list[tuple[float, int, can.Message]] = []
@@ -64,17 +64,21 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
                 modes=frozenset(modes),
                 absent=frozenset(absent),
             )
-            for dof in Dof
+            for dof in config.all_motors
         ]
-        where = np.zeros(3) if start is None else np.asarray(start, dtype=np.float64)
+        where = (
+            np.zeros(len(config.all_motors))
+            if start is None
+            else np.asarray(start, dtype=np.float64)
+        )
         for drive, position in zip(self._drives, where, strict=True):
             drive.values[0x6064, 0] = drive.scale.to_counts(float(position))
         self._is_disconnected = False
 
     @property
-    def states(self) -> Mapping[Dof, State]:
+    def states(self) -> Mapping[Motor, State]:
         """The state of each drive."""
-        return {dof: self._drives[dof].status for dof in Dof}
+        return {dof: self._drives[dof].status for dof in self._config.all_motors}
 
     def _begin(self) -> None:
         for drive in self._drives:
@@ -89,7 +93,7 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
         self._apply_requests(now)
         if message is not None and not message.is_error_frame:
             identifier, data = message.arbitration_id, bytes(message.data)
-            for dof, drive in zip(Dof, self._drives, strict=True):
+            for dof, drive in zip(self._config.all_motors, self._drives, strict=True):
                 if "drop" not in self._faults[dof]:
                     drive.receive(identifier, data, now)
             if identifier == 0x080:
@@ -121,11 +125,11 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
             return
         demand = np.array([drive.scale.to_position(drive.demand) for drive in self._drives])
         actual = demand if self._on_sync is None else self._on_sync(demand)
-        for dof, drive in zip(Dof, self._drives, strict=True):
+        for dof, drive in zip(self._config.all_motors, self._drives, strict=True):
             if "freeze" not in self._faults[dof]:
                 drive.set_position(drive.scale.to_counts(float(actual[dof])))
 
-    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
+    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
         drive = self._drives[dof]
         if kind == "fault":
             drive.fail(now)
@@ -133,10 +137,10 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
             drive.refuses_mode = True
             drive.values[0x6061, 0] = 0
 
-    def _recover(self, dof: Dof) -> None:
+    def _recover(self, dof: Motor) -> None:
         self._drives[dof].refuses_mode = False
 
-    def _sender(self, dof: Dof) -> Send:
+    def _sender(self, dof: Motor) -> Send:
         def send(identifier: int, data: bytes) -> None:
             faults = self._faults[dof]
             if "drop" in faults or ("heartbeat" in faults and identifier >= 0x700):

@@ -1,4 +1,4 @@
-"""Three simulated motors behind a pseudo-terminal, which a client opens as a serial port.
+"""Simulated motors behind a pseudo-terminal, which a client opens as a serial port.
 
 The motors move by themselves, as long as they have power: after each cycle of a client, and by the
 clock when no client cycles.
@@ -29,7 +29,7 @@ _IDLE = 0.005
 
 
 class LineMotors(SimulatedMotors[Kind]):
-    """Three motors on one line.
+    """Motors on one line.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
@@ -43,8 +43,7 @@ class LineMotors(SimulatedMotors[Kind]):
     def __init__(
         self, config: DrivesConfig, kinds: tuple[Kind, ...], on_cycle: OnCycle | None
     ) -> None:
-        super().__init__(kinds)
-        self._config = config
+        super().__init__(config, kinds)
         self._on_cycle = on_cycle
         self._has_goals = False
         self._buffer = bytearray()
@@ -71,11 +70,11 @@ class LineMotors(SimulatedMotors[Kind]):
 
     @abstractmethod
     def _advance(self, period: float, now: float) -> list[float]:
-        """Advance the position loops by a period [s]; the demanded positions [m, rad, rad]."""
+        """Advance the position loops by a period [s]; the demanded positions [m or rad]."""
 
     @abstractmethod
     def _move(self, positions: NDArray[np.float64]) -> None:
-        """Take note of the positions that the plant has reached (3,) [m, rad, rad]."""
+        """Take note of the positions that the plant has reached (n,) [m or rad]."""
 
     def _due(self) -> float:
         """When something must happen without a byte from the client [s]."""

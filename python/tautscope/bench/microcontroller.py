@@ -1,4 +1,4 @@
-"""A simulated microcontroller with three motors behind a pseudo-terminal, with fault injection.
+"""A simulated microcontroller with motors behind a pseudo-terminal, with fault injection.
 
 with SimulatedMicrocontroller(config, plant): ...  # a client opens drives.channel
 """
@@ -15,7 +15,7 @@ from tautscope.bench.line_motors import LineMotors
 from tautscope.bench.motors import OnCycle
 from tautscope.bench.serial_board import SerialBoard
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import FAULTS, Limits, Request, State
@@ -33,7 +33,7 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
         on_cycle: The plant; without it, the motors follow ideally.
-        start: (3,) positions at the start [m, rad, rad].
+        start: (n,) positions at the start [m or rad].
 
     Raises:
         ConfigError: The link cannot be made.
@@ -47,16 +47,16 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
         start: NDArray[np.float64] | None = None,
     ) -> None:
         super().__init__(config, get_args(FaultKind), on_cycle)
-        self._scales = [Scale(config[dof], dof.label) for dof in Dof]
-        self._at = [config[dof].node - 1 for dof in Dof]
-        shafts = np.zeros(3) if start is None else start
+        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+        self._at = [config[dof].node - 1 for dof in config.all_motors]
+        shafts = np.zeros(len(config.all_motors)) if start is None else start
         self.shafts = [
             scale.to_counts(float(shaft)) for scale, shaft in zip(self._scales, shafts, strict=True)
         ]
         """Where the motors are [counts from home]."""
-        self._zeros = [0, 0, 0]
-        self._demands = [0.0, 0.0, 0.0]
-        self._blocked: set[Dof] = set()
+        self._zeros = [0] * len(self._scales)
+        self._demands = [0.0] * len(self._scales)
+        self._blocked: set[Motor] = set()
         speeds = {
             at: scale.speed_counts() for at, scale in zip(self._at, self._scales, strict=True)
         }
@@ -82,7 +82,7 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
             self._queue(now + late + self._wire_time(len(message) + len(answer)), answer)
             self._has_goals |= message[0] == Request.SETPOINTS
         if self.board.state != before:
-            for dof in Dof:
+            for dof in self._config.all_motors:
                 self._logger(dof)(now, self.board.state.name.lower())
 
     def _due(self) -> float:
@@ -102,12 +102,12 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
         ]
 
     def _move(self, positions: NDArray[np.float64]) -> None:
-        for dof, position in zip(Dof, positions, strict=True):
+        for dof, position in zip(self._config.all_motors, positions, strict=True):
             if dof not in self._blocked:
                 self.shafts[dof] = self._scales[dof].to_counts(float(position))
             self.board.positions[self._at[dof]] = self.shafts[dof] - self._zeros[dof]
 
-    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
+    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
         if kind == "fault":
             self.board.faults[self._at[dof]] = _DRIVER
             self._logger(dof)(now, f"fault: {FAULTS[_DRIVER]}")
@@ -117,6 +117,6 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
             self._restart()
             self._logger(dof)(now, "restart")
 
-    def _recover(self, dof: Dof) -> None:
+    def _recover(self, dof: Motor) -> None:
         self._blocked.discard(dof)
         self.board.faults[self._at[dof]] = 0

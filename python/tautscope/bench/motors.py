@@ -13,34 +13,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench.events import Event
-from tautscope.dof import Dof
+from tautscope.config import DrivesConfig
+from tautscope.dof import Motor
 from tautscope.errors import ConfigError
 
 Kind = TypeVar("Kind", bound=str)
 OnCycle = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""The plant: demanded positions (3,) [m, rad, rad] to positions; called once per cycle of the
+"""The plant: demanded positions (n,) [m or rad] to positions; called once per cycle of the
 client (on CAN per SYNC, after the TxPDOs are sent), and by the clock where none cycles."""
 
 
 class SimulatedMotors(ABC, Generic[Kind]):
-    """Three motors on one bus, in a thread; a context manager.
+    """Motors on one bus, in a thread; a context manager.
 
     Leaving it switches their power off and raises the error that ended the thread, if any.
 
     Args:
+        config: The true rig.
         kinds: The faults that they know.
     """
 
-    def __init__(self, kinds: tuple[Kind, ...]) -> None:
+    def __init__(self, config: DrivesConfig, kinds: tuple[Kind, ...]) -> None:
+        self._config = config
         self._kinds = kinds
         self._events: list[Event] = []
-        self._requests: deque[tuple[Kind | None, Dof, float]] = deque()
-        self._faults: dict[Dof, dict[Kind, float]] = {dof: {} for dof in Dof}
+        self._requests: deque[tuple[Kind | None, Motor, float]] = deque()
+        self._faults: dict[Motor, dict[Kind, float]] = {dof: {} for dof in self._config.all_motors}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
         self._failure: BaseException | None = None
 
-    def inject(self, kind: Kind, dof: Dof, delay: float = 0.3) -> None:
+    def inject(self, kind: Kind, dof: Motor, delay: float = 0.3) -> None:
         """Inject a fault; `delay` [s] applies to the kind ``delay``.
 
         Raises:
@@ -50,7 +53,7 @@ class SimulatedMotors(ABC, Generic[Kind]):
             raise ConfigError("fault", kind, "one of " + ", ".join(self._kinds))
         self._requests.append((kind, dof, delay))
 
-    def clear(self, dof: Dof) -> None:
+    def clear(self, dof: Motor) -> None:
         """End the faults of a motor; a fault that it reports remains until it is reset."""
         self._requests.append((None, dof, 0.0))
 
@@ -90,11 +93,11 @@ class SimulatedMotors(ABC, Generic[Kind]):
         """Wait for what comes next, and process it."""
 
     @abstractmethod
-    def _apply(self, kind: Kind, dof: Dof, now: float) -> None:
+    def _apply(self, kind: Kind, dof: Motor, now: float) -> None:
         """Begin a fault."""
 
     @abstractmethod
-    def _recover(self, dof: Dof) -> None:
+    def _recover(self, dof: Motor) -> None:
         """End the faults of a motor."""
 
     def _apply_requests(self, now: float) -> None:
@@ -108,7 +111,7 @@ class SimulatedMotors(ABC, Generic[Kind]):
                 self._logger(dof)(now, f"fault: {kind}")
                 self._apply(kind, dof, now)
 
-    def _logger(self, dof: Dof) -> Callable[[float, str], None]:
+    def _logger(self, dof: Motor) -> Callable[[float, str], None]:
         def log(now: float, what: str) -> None:
             self._events.append(Event(now, dof.label, what))
 

@@ -23,7 +23,7 @@ from tautscope.bench.ground_truth import GroundTruthWriter
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.rig import require_drives
+from tautscope.hardware.motor_rig import require_drives
 from tautscope.twin.plant import Plant
 
 CAMERA = "camera"

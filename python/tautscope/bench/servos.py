@@ -1,4 +1,4 @@
-"""Three simulated servos behind a pseudo-terminal, with fault injection.
+"""Simulated servos behind a pseudo-terminal, with fault injection.
 
 with SimulatedServos(config, plant): ...  # a client opens drives.channel as a serial port
 """
@@ -24,7 +24,7 @@ from tautscope.bench.servo import (
 )
 from tautscope.bench.servo_packets import DynamixelPackets, FeetechPackets, Packet
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 
 FaultKind = Literal["drop", "delay", "fault", "freeze", "restart"]
 """drop: neither sends nor receives. delay: answers late. fault: overload, without torque. freeze:
@@ -32,12 +32,12 @@ the motor is blocked, which ends in an overload. restart: the power fails for a 
 
 
 class SimulatedServos(LineMotors[FaultKind]):
-    """Three servos on one line.
+    """Servos on one line.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
         on_cycle: The plant; without it, the motors follow ideally.
-        start: (3,) positions at power-on [m, rad, rad]; turns before it are unknown to the servos.
+        start: (n,) positions at power-on [m or rad]; turns before it are unknown to the servos.
 
     Raises:
         ConfigError: The link cannot be made.
@@ -56,10 +56,10 @@ class SimulatedServos(LineMotors[FaultKind]):
         self._word = 2 if self._is_v2 else 1
         self.servos = [
             SimulatedServo(config[dof], dof.label, config.protocol, self._logger(dof))
-            for dof in Dof
+            for dof in config.all_motors
         ]
         for servo, position in zip(
-            self.servos, np.zeros(3) if start is None else start, strict=True
+            self.servos, np.zeros(len(config.all_motors)) if start is None else start, strict=True
         ):
             servo.shaft = servo.scale.to_counts(float(position))
             servo.restart(time.monotonic())
@@ -81,7 +81,7 @@ class SimulatedServos(LineMotors[FaultKind]):
     def _listening(self) -> Iterator[SimulatedServo]:
         return (
             servo
-            for dof, servo in zip(Dof, self.servos, strict=True)
+            for dof, servo in zip(self._config.all_motors, self.servos, strict=True)
             if "drop" not in self._faults[dof]
         )
 
@@ -107,7 +107,9 @@ class SimulatedServos(LineMotors[FaultKind]):
             if answers:
                 raw = self._codec.status(name, error * self._is_v2 or servo.error, data)
                 at += self._wire_time(len(raw))
-                late = self._faults[Dof(self.servos.index(servo))].get("delay", 0.0)
+                late = self._faults[self._config.all_motors[self.servos.index(servo)]].get(
+                    "delay", 0.0
+                )
                 self._queue(at + late, raw)
 
     def _carry_out(self, servo: SimulatedServo, packet: Packet, now: float) -> tuple[int, bytes]:
@@ -144,7 +146,7 @@ class SimulatedServos(LineMotors[FaultKind]):
                 servo.write(address, data[start + 1 : start + 1 + size], now)
         self._has_goals |= address == servo.family.goal.address
 
-    def _apply(self, kind: FaultKind, dof: Dof, now: float) -> None:
+    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
         servo = self.servos[dof]
         servo.is_blocked |= kind == "freeze"
         if kind == "fault":
@@ -152,7 +154,7 @@ class SimulatedServos(LineMotors[FaultKind]):
         elif kind == "restart":
             servo.restart(now)
 
-    def _recover(self, dof: Dof) -> None:
+    def _recover(self, dof: Motor) -> None:
         self.servos[dof].is_blocked = False
 
 

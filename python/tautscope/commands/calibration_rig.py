@@ -100,8 +100,9 @@ def rig_for_calibration(
         raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
     refuse_wrong_limits(options.config)
     confirm_motion(options, ARTICLE_MOTION, config)
+    from tautscope.hardware.motor_rig import require_drives  # noqa: PLC0415
     from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
-    from tautscope.hardware.rig import HardwareRig, require_drives  # noqa: PLC0415
+    from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 

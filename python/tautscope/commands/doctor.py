@@ -99,7 +99,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
 def _check_own(
     options: argparse.Namespace, config: Config, make: Callable[[Config], Rig]
 ) -> Iterator[CheckResult]:
-    """Open the rig of ``--rig``, and check it if it may be reset.
+    """Check the drives, open the rig of ``--rig``, and check it if it may be reset.
 
     Raises:
         ConfigError: There is no such rig, or the configuration has no [[dof]].
@@ -109,6 +109,13 @@ def _check_own(
 
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
+    if config.drives is not None:
+        from tautscope.hardware.doctor import drives  # noqa: PLC0415
+
+        of_drives = drives.check_drives(config.drives)
+        yield from of_drives
+        if any(each.status == "missing" for each in of_drives):
+            return
     rig = make(config)
     try:
         period = f"control_period {1e3 * config.control.period:g} ms, as control.period"

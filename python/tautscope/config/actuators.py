@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tautscope.config.axes import DofEntry, Name
+from tautscope.config.drives import DrivesConfig
 from tautscope.config.section import Section, relation
 from tautscope.errors import ConfigError
 
@@ -57,12 +58,34 @@ def _check_actuators(actuators: ActuatorsConfig) -> None:
             raise ConfigError(f"names[{index}]", name, "a name used once")
 
 
-def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry], drives: Any) -> None:
+def check_motors(
+    drives: DrivesConfig, actuators: ActuatorsConfig | None, dofs: Sequence[DofEntry]
+) -> None:
+    """Check that section ``drives`` has the motors of the robot; keys from the root."""
+    if bool(drives.motors) != bool(dofs):
+        found = list(drives.motors) or [motor.label for motor in drives.all_motors]
+        allowed = "[drives.motors.NAME] with [[dof]], else insertion, rotation and bending"
+        raise ConfigError("drives", found, allowed)
+    if not dofs:
+        return
+    if actuators is None:
+        names, units = [dof.name for dof in dofs], [str(dof.unit) for dof in dofs]
+    elif len(actuators.names) == len(actuators.units) > 0:
+        names, units = list(actuators.names), list(actuators.units)
+    else:
+        allowed = "names and units of the motors in [drives.motors]"
+        raise ConfigError("actuators.names", list(actuators.names), allowed)
+    if list(drives.motors) != names:
+        raise ConfigError("drives.motors", list(drives.motors), f"in this order {names}")
+    for (name, motor), unit in zip(drives.motors.items(), units, strict=True):
+        if motor.unit != unit:
+            raise ConfigError(f"drives.motors.{name}.unit", motor.unit, repr(unit))
+
+
+def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry]) -> None:
     """Check section ``actuators`` with [[dof]]; keys from the root."""
-    if not dofs or drives is not None:
-        found = "[drives]" if dofs else "no [[dof]]"
-        allowed = "[[dof]], and a rig of your own; [drives] has its own gains and limits"
-        raise ConfigError("actuators", found, allowed)
+    if not dofs:
+        raise ConfigError("actuators", "no [[dof]]", "[[dof]]: the article's are its motors")
     for index, row in enumerate(actuators.matrix):
         if len(row) != len(dofs):
             allowed = f"{len(dofs)} numbers, one per degree of freedom"

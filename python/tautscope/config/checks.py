@@ -202,12 +202,18 @@ _OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
 @relation(DrivesConfig)
 def _check_drives(drives: DrivesConfig) -> None:
     """Also the ranges that CANopen can express."""
+    given = [dof.label for dof in Dof if getattr(drives, dof.label) is not None]
+    if drives.motors:
+        _require(not given, "motors", list(drives.motors), f"either motors or {', '.join(given)}")
+    for dof in () if drives.motors else Dof:
+        allowed = "a motor, or motors of [[dof]] in [drives.motors]"
+        _require(dof.label in given, dof.label, None, allowed)
     taken = {drives.master_node: "master_node"}
-    for dof in Dof:
-        axis, path = drives[dof], dof.label
+    for motor in drives.all_motors:
+        axis, path = drives[motor], motor.key.removeprefix("drives.")
         owner = taken.get(axis.node)
         _require(owner is None, f"{path}.node", axis.node, f"not that of {owner}")
-        taken[axis.node] = dof.label
+        taken[axis.node] = motor.label
         _require(axis.travel[0] < axis.travel[1], f"{path}.travel", axis.travel, _RANGE)
         _require(
             max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,

@@ -8,7 +8,7 @@ from msgspec import Meta, field
 
 from tautscope.config.fields import Fraction, Positive
 from tautscope.config.section import Section
-from tautscope.dof import Dof
+from tautscope.dof import Dof, Motor, NamedMotor
 
 Preset = Literal["copley", "elmo_gold", "elmo_whistle", "epos4"]
 """Makers' drives, see `tautscope.config.presets`."""
@@ -79,15 +79,26 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     uses, set in the servo."""
 
 
+class MotorConfig(AxisConfig, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A motor of a robot with ``[[dof]]``; the unit of its values is `unit`."""
+
+    unit: Annotated[str, Meta(min_length=1, max_length=10)] = "rad"
+    """Unit of its positions: that of its degree of freedom, or of ``actuators.units``."""
+
+
 class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Drives or servos on a bus; only a physical rig and the bench have this section.
 
     The default times are [ours].
     """
 
-    insertion: AxisConfig
-    rotation: AxisConfig
-    bending: AxisConfig
+    insertion: AxisConfig | None = None
+    rotation: AxisConfig | None = None
+    bending: AxisConfig | None = None
+    motors: Annotated[dict[str, MotorConfig], Meta(max_length=8)] = field(default_factory=dict)
+    """The motors of a robot with ``[[dof]]``, by its names in their order, or by those of
+    ``[actuators]``, in place of insertion, rotation and bending: the keys of those, and ``unit`` of
+    their values, which is that of the DOF or of ``actuators.units``."""
     protocol: Literal["canopen", "ethercat", "dynamixel", "feetech", "serial"] = "canopen"
     """Protocol of the bus: CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos (protocol
     2.0), Feetech STS servos, or motors behind a microcontroller on a serial line."""
@@ -145,7 +156,13 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     (6061), interpolation time (60C2), bit 12 (follows set-points) or 13 (following error) of the
     statusword (6041.12, 6041.13)."""
 
-    def __getitem__(self, dof: Dof) -> AxisConfig:
-        """Settings of one DOF."""
-        axis: AxisConfig = getattr(self, dof.label)
-        return axis
+    @property
+    def all_motors(self) -> tuple[Motor, ...]:
+        """The motors in the order of every array."""
+        named = enumerate(self.motors.items())
+        return tuple(NamedMotor(at, name, each.unit) for at, (name, each) in named) or tuple(Dof)
+
+    def __getitem__(self, motor: Motor) -> AxisConfig:
+        """Settings of one motor."""
+        own = self.motors or {dof.label: getattr(self, dof.label) for dof in Dof}
+        return own[motor.label]

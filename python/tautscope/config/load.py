@@ -63,7 +63,10 @@ def dump_config(config: Config) -> str:
 def _resolve_paths(document: dict[str, Any], folder: Path) -> None:
     """Make paths in the document relative to the folder of the TOML file."""
     drives = document.get("drives")
-    for axis in drives.values() if isinstance(drives, dict) else ():
+    if not isinstance(drives, dict):
+        return
+    named = drives.get("motors")
+    for axis in [*drives.values(), *(named.values() if isinstance(named, dict) else ())]:
         if isinstance(axis, dict) and isinstance(axis.get("eds"), str):
             axis["eds"] = str(folder / axis["eds"])
 

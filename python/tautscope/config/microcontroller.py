@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tautscope.config.servos import LAG, PORTS
-from tautscope.dof import Dof
+from tautscope.config.servos import LAG, PORTS, with_motor_defaults
 
 PROTOCOL = "serial"
 """``drives.protocol`` of the serial line protocol, docs/serial.md."""
@@ -19,21 +18,20 @@ _FOLLOWING_SHARE = 0.01
 """`AxisConfig.following_error` over the width of the travel."""
 
 
-def with_motor_defaults(drives: dict[str, Any]) -> dict[str, Any]:
-    """The document of a section ``drives``, with the defaults of its motors and serial line."""
+def with_axis_defaults(drives: dict[str, Any]) -> dict[str, Any]:
+    """The document of a section ``drives``, with the defaults of any motor and the serial line."""
     line = {"channel": SERIAL_PORTS[PROTOCOL], "bitrate": _BITRATE, "lag": LAG}
     filled = (line if drives.get("protocol") == PROTOCOL else {}) | drives
-    for dof in Dof:
-        axis = drives.get(dof.label)
-        if not isinstance(axis, dict):
-            continue
-        defaults: dict[str, Any] = {"sign": 1}
-        match axis.get("travel"):
-            case [float() | int() as lower, float() | int() as upper] if lower < upper:
-                defaults["following_error"] = _FOLLOWING_SHARE * (upper - lower)
-        defaults |= axis
-        match defaults.get("following_error"):
-            case float() | int() as error:
-                defaults = {"following_window": error / 2} | defaults
-        filled[dof.label] = defaults
-    return filled
+    return with_motor_defaults(filled, _with_defaults)
+
+
+def _with_defaults(_: str, axis: dict[str, Any]) -> dict[str, Any]:
+    defaults: dict[str, Any] = {"sign": 1}
+    match axis.get("travel"):
+        case [float() | int() as lower, float() | int() as upper] if lower < upper:
+            defaults["following_error"] = _FOLLOWING_SHARE * (upper - lower)
+    defaults |= axis
+    match defaults.get("following_error"):
+        case float() | int() as error:
+            defaults = {"following_window": error / 2} | defaults
+    return defaults

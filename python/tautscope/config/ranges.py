@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import msgspec
 import msgspec.inspect as types
 
 
@@ -47,6 +48,21 @@ def allowed_at(kind: Any, keys: Sequence[str]) -> str:
     for key in keys:
         place = _member(place, key)
     return allowed_values(place)
+
+
+def wrong_entry(kind: Any, keys: Sequence[str], entries: Any) -> str | None:
+    """The first key of a table of sections whose section is wrong; the table is at a path."""
+    place = types.type_info(kind)
+    for key in keys:
+        place = _member(place, key)
+    if not isinstance(place, types.DictType) or not isinstance(place.value_type, types.StructType):
+        return None
+    for name, entry in entries.items():
+        try:
+            msgspec.convert(entry, place.value_type.cls)
+        except msgspec.ValidationError:
+            return str(name)
+    return None
 
 
 def _member(kind: types.Type, key: str) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import field
 
-from tautscope.config.actuators import ActuatorsConfig, check_actuators
+from tautscope.config.actuators import ActuatorsConfig, check_actuators, check_motors
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
@@ -20,7 +20,7 @@ from tautscope.config.estimation import EstimationConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.law import LawConfig
-from tautscope.config.microcontroller import with_motor_defaults
+from tautscope.config.microcontroller import with_axis_defaults
 from tautscope.config.presets import with_preset
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
@@ -91,7 +91,9 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         check_ranges(self)
         check_topics(self.dof, self.kinematics, self.measurement)
         if self.actuators is not None:
-            check_actuators(self.actuators, self.dof, self.drives)
+            check_actuators(self.actuators, self.dof)
+        if self.drives is not None:
+            check_motors(self.drives, self.actuators, self.dof)
 
     @property
     def dofs(self) -> tuple[NamedDof, ...]:
@@ -141,7 +143,7 @@ def _checked(document: dict[str, Any]) -> Config:
     document = _merged(to_document(Config()), without_numpy(document))
     if isinstance(document.get("drives"), dict):
         drives = with_preset(with_servo_defaults(document["drives"]))
-        document["drives"] = with_motor_defaults(drives)
+        document["drives"] = with_axis_defaults(drives)
     config: Config = converted_value("", document, Config)
     return config
 

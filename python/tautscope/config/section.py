@@ -109,7 +109,7 @@ def _config_error(
     expected, _, path = (
         message.rpartition(" - at `$") if " - at `$" in message else (message, "", "")
     )
-    path = path.rstrip("`").lstrip(".")
+    path = _with_entry(path.rstrip("`").lstrip("."), document, kind)
     cause = error.__cause__
     if isinstance(cause, ConfigError):  # of a section's own constructor
         return ConfigError(_joined(prefix, path, cause.field), cause.value, cause.allowed)
@@ -135,6 +135,20 @@ def _config_error(
 
         allowed = allowed_at(kind, keys)
     return ConfigError(_joined(prefix, path) or "config", value, allowed)
+
+
+def _with_entry(path: str, document: Any, kind: Any) -> str:
+    """A path with the name of a table's entry, for which msgspec has "[...]"."""
+    place, found, rest = path.partition("[...]")
+    if not found:
+        return path
+    from tautscope.config.ranges import wrong_entry  # noqa: PLC0415  only errors need it
+
+    keys = re.findall(r"[^.\[\]]+", place)
+    for key in keys:
+        document = document[int(key) if isinstance(document, list | tuple) else key]
+    name = wrong_entry(kind, keys, document)
+    return path if name is None else f"{place}.{name}{rest}"
 
 
 def _joined(*parts: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,8 +57,8 @@ def models_of(protocol: str) -> tuple[str, ...]:
 def with_servo_defaults(drives: dict[str, Any]) -> dict[str, Any]:
     """The document of a section ``drives``, with the defaults of its servos if it has any.
 
-    A horn that is the DOF itself turns by 1 rad per rad; a motor of insertion has no default
-    of ``counts_per_unit``.
+    A horn that is the DOF itself turns by 1 rad per rad; a motor of insertion, or of another unit
+    than rad, has no default of ``counts_per_unit``.
 
     Raises:
         ConfigError: A model is unknown, or of another protocol.
@@ -66,20 +67,40 @@ def with_servo_defaults(drives: dict[str, Any]) -> dict[str, Any]:
     if protocol not in PORTS:
         return drives
     filled = {"channel": PORTS[protocol], "lag": LAG, **drives}
-    for dof in Dof:
-        axis = drives.get(dof.label)
-        if not isinstance(axis, dict):
-            continue
+
+    def with_defaults(key: str, axis: dict[str, Any]) -> dict[str, Any]:
         name = axis.get("model")
         if name not in models_of(protocol):
             allowed = "one of " + ", ".join(models_of(protocol))
-            raise ConfigError(f"drives.{dof.label}.model", name, allowed)
-        filled[dof.label] = _with_defaults(axis, MODELS[name], dof)
+            raise ConfigError(f"{key}.model", name, allowed)
+        is_angle = axis.get("unit", "rad") == "rad" and key != Dof.INSERTION.key
+        return _with_defaults(axis, MODELS[name], is_angle=is_angle)
+
+    return with_motor_defaults(filled, with_defaults)
+
+
+def with_motor_defaults(
+    drives: dict[str, Any], with_defaults: Callable[[str, dict[str, Any]], dict[str, Any]]
+) -> dict[str, Any]:
+    """A copy of the document of a section ``drives``, with defaults of its motors.
+
+    Args:
+        drives: The document; what has the wrong type is refused later.
+        with_defaults: From key and document of a motor to that with its defaults.
+    """
+
+    def each(place: str, motors: Any, names: Iterable[str]) -> dict[str, Any]:
+        found = {name: motors[name] for name in names if isinstance(motors.get(name), dict)}
+        return {name: with_defaults(f"{place}.{name}", own) for name, own in found.items()}
+
+    filled = drives | each("drives", drives, [dof.label for dof in Dof])
+    if isinstance(own := drives.get("motors"), dict):
+        filled["motors"] = own | each("drives.motors", own, own)
     return filled
 
 
-def _with_defaults(axis: dict[str, Any], model: ServoModel, dof: Dof) -> dict[str, Any]:
-    radian = {} if dof is Dof.INSERTION else {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)}
+def _with_defaults(axis: dict[str, Any], model: ServoModel, *, is_angle: bool) -> dict[str, Any]:
+    radian = {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)} if is_angle else {}
     filled = {**radian, **axis}
     counts = filled.get("counts_per_unit")
     if not isinstance(counts, int | float) or counts <= 0:

@@ -21,7 +21,7 @@ from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import ConfigError, DriveError, SettingRefusedError, SilentDriveError
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.canopen_master import (
@@ -80,7 +80,7 @@ class _Sdo(SdoClient):
 
 
 class CanopenFieldbus:
-    """Three drives on a CAN bus; a `tautscope.hardware.fieldbus.Fieldbus`.
+    """Drives on a CAN bus; a `tautscope.hardware.fieldbus.Fieldbus`.
 
     Args:
         config: Bus, nodes, timeouts.
@@ -94,10 +94,10 @@ class CanopenFieldbus:
 
     def __init__(self, config: DrivesConfig, bus: can.BusABC | None = None) -> None:
         self._config = config
-        dictionaries = {dof: _dictionary(config, dof) for dof in Dof}
+        dictionaries = {dof: _dictionary(config, dof) for dof in config.all_motors}
         self._network = Network()
         self._network.bus = self._bus = open_bus(config) if bus is None else bus
-        self._sdo: dict[Dof, _Sdo] = {}
+        self._sdo: dict[Motor, _Sdo] = {}
         self._master = CanopenMaster(config, self._bus, self._on_sdo_response)
         for dof, dictionary in dictionaries.items():
             node = config[dof].node
@@ -107,22 +107,22 @@ class CanopenFieldbus:
             self._sdo[dof] = sdo
         try:
             self._master.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)
-            for dof in Dof:
+            for dof in config.all_motors:
                 self._check_identity(dof)
         except BaseException:
             self.close()
             raise
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """See `Fieldbus.name`."""
         return self._master.nodes[dof].name
 
-    def read(self, dof: Dof, entry: Entry) -> int:
+    def read(self, dof: Motor, entry: Entry) -> int:
         """Read a value by SDO upload; see `Fieldbus.read`."""
         data = self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
         return entry.decode(data)
 
-    def write(self, dof: Dof, entry: Entry, value: int) -> None:
+    def write(self, dof: Motor, entry: Entry, value: int) -> None:
         """Write a value by SDO download; see `Fieldbus.write`."""
         known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
         size = len(known) // 8 if known is not None and known.fixed_size else entry.size
@@ -130,10 +130,10 @@ class CanopenFieldbus:
         what = f"{entry} = {value}"
         self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
 
-    def configure(self, modes: Mapping[Dof, Mode]) -> None:
+    def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure producer and consumer heartbeats and the PDOs, and read them back."""
         config = self._config
-        for dof in Dof:
+        for dof in self._config.all_motors:
             node = self._master.nodes[dof]
             self._master.send_nmt(PRE_OPERATIONAL, node.id)
             period = round(config.heartbeat_period * 1e3)
@@ -172,9 +172,9 @@ class CanopenFieldbus:
         """See `Fieldbus.broadcast`."""
         for node in self._master.nodes.values():
             node.controlword = None  # send it in every cycle
-        return self._master.exchange([controlword] * 3, targets)
+        return self._master.exchange([controlword] * len(targets), targets)
 
-    def stop_communication(self, dofs: Sequence[Dof]) -> None:
+    def stop_communication(self, dofs: Sequence[Motor]) -> None:
         """Stop these nodes (NMT); without the master's heartbeat they quick-stop by themselves."""
         self._master.is_monitoring = False
         with suppress(DriveError):  # the bus may be lost
@@ -187,7 +187,7 @@ class CanopenFieldbus:
             return
         if self._master.is_monitoring:
             self._master.is_monitoring = False
-            for dof in Dof:
+            for dof in self._config.all_motors:
                 try:
                     with suppress(SettingRefusedError):  # it may lack the object
                         self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
@@ -202,7 +202,7 @@ class CanopenFieldbus:
             if sdo.tx_cobid == SDO_RESPONSE + node:
                 sdo.responses.put(data)
 
-    def _request(self, dof: Dof, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
+    def _request(self, dof: Motor, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
         node = self._master.nodes[dof]
         try:
             data = transfer(self._sdo[dof])
@@ -212,17 +212,17 @@ class CanopenFieldbus:
             raise SilentDriveError(
                 node.name,
                 f"no answer to an SDO request for {what} ({error})",
-                f"Check drives.{dof.label}.node, its supply, the bus and the bit rate",
+                f"Check {dof.key}.node, its supply, the bus and the bit rate",
             ) from None
         except (can.CanError, OSError, RuntimeError) as error:
             raise bus_lost(error) from error
         return data if data is not None else b""
 
-    def _set(self, dof: Dof, entry: Entry, value: int) -> None:
+    def _set(self, dof: Motor, entry: Entry, value: int) -> None:
         self.write(dof, entry, value)
         verify_setting(self, dof, entry, value)
 
-    def _set_or_waive(self, dof: Dof, entry: Entry, value: int) -> bool:
+    def _set_or_waive(self, dof: Motor, entry: Entry, value: int) -> bool:
         """Set a value and read it back; False if that fails and is waived."""
         try:
             self._set(dof, entry, value)
@@ -232,7 +232,7 @@ class CanopenFieldbus:
         return True
 
     def _map(
-        self, dof: Dof, base: int, cob: int, transmission_type: int, entries: tuple[Entry, ...]
+        self, dof: Motor, base: int, cob: int, transmission_type: int, entries: tuple[Entry, ...]
     ) -> None:
         """Configure a PDO in the order of CiA 301: invalidate, change, validate."""
         name = f"PDO 0x{base:04X}"
@@ -248,7 +248,7 @@ class CanopenFieldbus:
         self._set(dof, count, len(entries))
         self._set(dof, identifier, valid)
 
-    def _check_identity(self, dof: Dof) -> None:
+    def _check_identity(self, dof: Motor) -> None:
         """Check that the EDS file describes this drive."""
         described = self._sdo[dof].od.device_information
         for entry, number in (
@@ -257,13 +257,13 @@ class CanopenFieldbus:
         ):
             if number and (found := self.read(dof, entry)) != number:
                 raise ConfigError(
-                    f"drives.{dof.label}.eds",
+                    f"{dof.key}.eds",
                     self._config[dof].eds,
                     f"the EDS file of node {self._config[dof].node}, whose {entry} is "
                     f"0x{found:X}, not 0x{number:X}",
                 )
 
-    def _disable_pdo(self, dof: Dof, base: int) -> None:
+    def _disable_pdo(self, dof: Motor, base: int) -> None:
         """Invalidate an unused PDO, if the drive has it."""
         identifier = objects.pdo_entries(base, base + 0x200, 0, f"PDO 0x{base:04X}")[0]
         try:
@@ -274,11 +274,9 @@ class CanopenFieldbus:
             pass
 
 
-def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
+def _dictionary(config: DrivesConfig, dof: Motor) -> ObjectDictionary:
     axis = config[dof]
     try:
         return load_eds(axis.eds, axis.node)
     except (OSError, ValueError) as error:
-        raise ConfigError(
-            f"drives.{dof.label}.eds", axis.eds, f"a readable EDS file ({error})"
-        ) from None
+        raise ConfigError(f"{dof.key}.eds", axis.eds, f"a readable EDS file ({error})") from None

@@ -23,7 +23,6 @@ from typing import Any
 import can
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
 from tautscope.errors import BusError, EmergencyError, HeartbeatError, SecondMasterError, StateError
 from tautscope.hardware.fieldbus import EMPTY_TX_PDO, TX_PDO_SIZE, Feedback, TxPdo
 
@@ -67,7 +66,7 @@ class Node:
 
 
 class CanopenMaster:
-    """Exchanges frames with three drives and checks their heartbeats and emergency objects.
+    """Exchanges frames with drives and checks their heartbeats and emergency objects.
 
     Args:
         config: Node ids and timeouts.
@@ -82,7 +81,8 @@ class CanopenMaster:
         self._bus = bus
         self._on_sdo_response = on_sdo_response
         self.nodes = {
-            dof: Node(f"{dof.label}, node {config[dof].node}", config[dof].node) for dof in Dof
+            dof: Node(f"{dof.label}, node {config[dof].node}", config[dof].node)
+            for dof in config.all_motors
         }
         self._by_id = {node.id: node for node in self.nodes.values()}
         self._master_identifiers = self._identifiers_of_a_master()

@@ -1,4 +1,4 @@
-"""Three CiA 402 drives: state transitions from enabling over set-points to quick stop."""
+"""CiA 402 drives: state transitions from enabling over set-points to quick stop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from tautscope.config import DrivesConfig
 from tautscope.config.drives import waiver_hint
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import DriveError, StateError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
@@ -36,7 +36,7 @@ CONFIRMATIONS = 2
 
 
 class Cia402Drives:
-    """Three CiA 402 drives on a fieldbus; a `tautscope.hardware.drive_group.DriveGroup`.
+    """CiA 402 drives on a fieldbus; a `tautscope.hardware.drive_group.DriveGroup`.
 
     Args:
         config: Cycle and timeouts.
@@ -48,9 +48,9 @@ class Cia402Drives:
     def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
         self._config = config
         self._bus = bus
-        self._modes: dict[Dof, Mode] = {}
-        self._controlwords = [cia402.DISABLE_VOLTAGE] * 3
-        self._targets = [0, 0, 0]
+        self._modes: dict[Motor, Mode] = {}
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(config.all_motors)
+        self._targets = [0] * len(config.all_motors)
         self._feedback: list[Feedback] = []
         self._is_operational = False
 
@@ -61,16 +61,16 @@ class Cia402Drives:
         is_buffered = Mode.INTERPOLATED_POSITION in self._modes.values()
         return 1 + (self._config.lead_points if is_buffered else 0)
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """See `DriveGroup.name`."""
         return self._bus.name(dof)
 
-    def serial_number(self, dof: Dof) -> str:
+    def serial_number(self, dof: Motor) -> str:
         """The serial number in the identity object (0x1018:4)."""
         number = self._read_or_zero(dof, objects.SERIAL_NUMBER)
         return f"{number:08X}" if number else ""
 
-    def status(self, dof: Dof) -> DriveStatus:
+    def status(self, dof: Motor) -> DriveStatus:
         """Read state, position, supported modes and identity."""
         supported = self._read_or_zero(dof, objects.SUPPORTED_MODES)
         state = cia402.state_of(self._bus.read(dof, objects.STATUSWORD))
@@ -98,7 +98,7 @@ class Cia402Drives:
             {"vendor": vendor, "state": state.value if state else None, "modes": modes},
         )
 
-    def commission(self, dof: Dof) -> CommissionedDrive:
+    def commission(self, dof: Motor) -> CommissionedDrive:
         """See `tautscope.hardware.commissioning.commission`."""
         drive = commission(self._bus, self._config, dof)
         self._modes[dof] = Mode(drive.mode)
@@ -110,7 +110,7 @@ class Cia402Drives:
 
     def read_positions(self) -> list[int]:
         """See `DriveGroup.read_positions`."""
-        return [self._bus.read(dof, objects.POSITION_ACTUAL) for dof in Dof]
+        return [self._bus.read(dof, objects.POSITION_ACTUAL) for dof in self._config.all_motors]
 
     def start(self, positions: list[int]) -> None:
         """See `DriveGroup.start`."""
@@ -119,7 +119,7 @@ class Cia402Drives:
 
     def probe(self) -> list[Feedback]:
         """Run one cycle with the controlword quick stop."""
-        return self._bus.exchange([cia402.QUICK_STOP] * 3, self._targets)
+        return self._bus.exchange([cia402.QUICK_STOP] * len(self._targets), self._targets)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
         """Run one cycle with new target positions [counts].
@@ -129,7 +129,7 @@ class Cia402Drives:
         """
         self._targets = targets
         self._cycle()
-        for dof in Dof:
+        for dof in self._config.all_motors:
             self._check_state(dof, self._feedback[dof])
         return self._feedback
 
@@ -143,7 +143,7 @@ class Cia402Drives:
         self._is_operational = True
         if reset_faults:
             self._run_transition(self._reset_fault)
-        self._controlwords = [cia402.DISABLE_VOLTAGE] * 3
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
         self._run_transition(self._enable)
         if Mode.INTERPOLATED_POSITION in self._modes.values():
             for _ in range(self._config.lead_points):
@@ -178,7 +178,7 @@ class Cia402Drives:
 
     def _command_until(self, controlword: int, states: frozenset[State]) -> list[str]:
         """Repeat a controlword until all drives confirm a state; names of those that do not."""
-        confirmed = [0, 0, 0]
+        confirmed = [0] * len(self._targets)
         deadline = time.monotonic() + self._config.state_timeout
         while min(confirmed) < CONFIRMATIONS and time.monotonic() < deadline:
             try:
@@ -190,7 +190,7 @@ class Cia402Drives:
                 confirmed[dof] = confirmed[dof] + 1 if is_there else 0
             if not all(confirmed):
                 time.sleep(self._config.cycle / 4)
-        pending = [dof for dof in Dof if confirmed[dof] < CONFIRMATIONS]
+        pending = [dof for dof in self._config.all_motors if confirmed[dof] < CONFIRMATIONS]
         if pending:
             self._bus.stop_communication(pending)
         return [self._bus.name(dof) for dof in pending]
@@ -214,15 +214,15 @@ class Cia402Drives:
         self._cycle()
         time.sleep(max(0.0, self._config.cycle - (time.monotonic() - began)))
 
-    def _run_transition(self, step: Callable[[Dof, State | None, Feedback], bool]) -> None:
+    def _run_transition(self, step: Callable[[Motor, State | None, Feedback], bool]) -> None:
         """Cycle until `step` is true for every drive; each state has its own timeout."""
-        seen: list[int | None] = [None] * 3
-        since = [time.monotonic()] * 3
+        seen: list[int | None] = [None] * len(self._targets)
+        since = [time.monotonic()] * len(self._targets)
         timeout = self._config.state_timeout
         while True:
             self._paced_cycle()
             all_done = True
-            for dof in Dof:
+            for dof in self._config.all_motors:
                 feedback = self._feedback[dof]
                 has_answered = not feedback.age or bool(feedback.statusword)
                 is_done = has_answered and step(dof, cia402.state_of(feedback.statusword), feedback)
@@ -234,7 +234,7 @@ class Cia402Drives:
             if all_done:
                 return
 
-    def _reset_fault(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+    def _reset_fault(self, dof: Motor, state: State | None, feedback: Feedback) -> bool:
         if state in (State.FAULT, State.FAULT_REACTION):
             # Fault reset is the rising edge of bit 7.
             self._controlwords[dof] ^= cia402.FAULT_RESET
@@ -242,7 +242,7 @@ class Cia402Drives:
         self._controlwords[dof] = cia402.DISABLE_VOLTAGE
         return True
 
-    def _enable(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+    def _enable(self, dof: Motor, state: State | None, feedback: Feedback) -> bool:
         if state is State.FAULT:
             raise state_error(self._bus.name(dof), feedback)
         word = cia402.next_controlword(state)
@@ -252,7 +252,7 @@ class Cia402Drives:
             self._targets[dof] = feedback.position  # no step when it becomes enabled
         return state is State.OPERATION_ENABLED
 
-    def _start_following(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+    def _start_following(self, dof: Motor, state: State | None, feedback: Feedback) -> bool:
         if state is not State.OPERATION_ENABLED:
             raise state_error(self._bus.name(dof), feedback)
         if self._modes[dof] is Mode.INTERPOLATED_POSITION:
@@ -260,7 +260,7 @@ class Cia402Drives:
         is_entered = "6061" not in self._config.waive or feedback.mode == self._modes[dof]
         return is_entered and self._follows(feedback)
 
-    def _check_state(self, dof: Dof, feedback: Feedback) -> None:
+    def _check_state(self, dof: Motor, feedback: Feedback) -> None:
         name, mode = self._bus.name(dof), self._modes[dof]
         if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
             raise state_error(self._bus.name(dof), feedback)
@@ -273,7 +273,7 @@ class Cia402Drives:
         if not self._follows(feedback):
             raise ignores_setpoints(name, feedback)
 
-    def _read_or_zero(self, dof: Dof, entry: Entry) -> int:
+    def _read_or_zero(self, dof: Motor, entry: Entry) -> int:
         try:
             return self._bus.read(dof, entry)
         except AbsentError:

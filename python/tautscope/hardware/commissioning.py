@@ -13,7 +13,7 @@ import time
 
 from tautscope.config import DrivesConfig
 from tautscope.config.drives import waiver_hint
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import ModeRefusedError, SettingRefusedError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
@@ -34,7 +34,7 @@ CIA_402 = 402
 """Device profile number, the low 16 bits of 0x1000."""
 
 
-def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDrive:
+def commission(bus: Fieldbus, config: DrivesConfig, dof: Motor) -> CommissionedDrive:
     """Configure one drive, which stays disabled.
 
     Raises:
@@ -48,7 +48,7 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDri
         raise ModeRefusedError(
             bus.name(dof),
             f"its device type is 0x{device_type:08X}, not that of a CiA 402 drive",
-            f"Check drives.{dof.label}.node",
+            f"Check {dof.key}.node",
         )
     setup = _DriveSetup(bus, config, dof)
     setup.set_protections()
@@ -68,7 +68,7 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDri
 class _DriveSetup:
     """Settings of one drive while they are written."""
 
-    def __init__(self, bus: Fieldbus, config: DrivesConfig, dof: Dof) -> None:
+    def __init__(self, bus: Fieldbus, config: DrivesConfig, dof: Motor) -> None:
         self._bus, self._config, self._dof = bus, config, dof
         self._scale = Scale(config[dof], dof.label)
         self.settings: dict[str, int] = {}

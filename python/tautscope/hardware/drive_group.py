@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 
 
 class Feedback(Protocol):
@@ -90,7 +90,7 @@ class DriveStatus:
 
 
 class DriveGroup(Protocol):
-    """Three drives, one per DOF, on one bus; for use by one thread.
+    """The drives of a rig, one per motor, on one bus; for use by one thread.
 
     Every method may raise `tautscope.errors.DriveError`: the bus is lost, or a drive does not
     answer or reports a fault. Positions are in counts, see `tautscope.hardware.scale.Scale`.
@@ -101,19 +101,19 @@ class DriveGroup(Protocol):
         """Number of newest set-points that cannot have an effect yet when positions are read."""
         ...
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """The drive's name for messages: DOF and node."""
         ...
 
-    def serial_number(self, dof: Dof) -> str:
+    def serial_number(self, dof: Motor) -> str:
         """The drive's serial number; empty where it is missing."""
         ...
 
-    def status(self, dof: Dof) -> DriveStatus:
+    def status(self, dof: Motor) -> DriveStatus:
         """Read identity, state and position; nothing is written."""
         ...
 
-    def commission(self, dof: Dof) -> CommissionedDrive:
+    def commission(self, dof: Motor) -> CommissionedDrive:
         """Set protections, limits and mode, and read them back; the drive stays disabled.
 
         Raises:

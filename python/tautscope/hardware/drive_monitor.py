@@ -1,17 +1,17 @@
-"""Checks of what three drives report, whatever their protocol: timeliness, following error."""
+"""Checks of what drives report, whatever their protocol: timeliness, following error."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.config.drives import waiver_hint
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import FollowingError, SilentDriveError
 from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.following_error import FollowingErrorMonitor
@@ -23,31 +23,31 @@ class BusStatistics:
     """Timing of the bus since the motors were enabled.
 
     Attributes:
+        late: Per motor, cycles that ended before the answer of the drive came.
+        lost: Per motor, answers that never came; a pending answer counts until it comes.
         cycles: Set-points sent.
-        late: Per DOF, cycles that ended before the answer of the drive came.
-        lost: Per DOF, answers that never came; a pending answer counts until it comes.
         longest_pause: Longest time between two cycles [s].
     """
 
+    late: list[int]
+    lost: list[int]
     cycles: int = 0
-    late: list[int] = field(default_factory=lambda: [0, 0, 0])
-    lost: list[int] = field(default_factory=lambda: [0, 0, 0])
     longest_pause: float = 0.0
 
 
 def outside_travel(
-    name: str, dof: Dof, position: float, travel: tuple[float, float]
+    name: str, dof: Motor, position: float, travel: tuple[float, float]
 ) -> FollowingError:
     """The error for a motor at a position [m or rad] outside its travel."""
     return FollowingError(
         name,
         f"position {position:.6g} is outside its travel {travel[0]:g} to {travel[1]:g}",
-        f"Move it inside by hand, or check drives.{dof.label}.home, sign and counts_per_unit",
+        f"Move it inside by hand, or check {dof.key}.home, sign and counts_per_unit",
     )
 
 
 class DriveMonitor:
-    """Checks the feedback of three drives in each cycle.
+    """Checks the feedback of drives in each cycle.
 
     Args:
         config: Limits and timeouts.
@@ -58,12 +58,15 @@ class DriveMonitor:
     def __init__(self, config: DrivesConfig, names: Sequence[str], pending: int) -> None:
         self._config = config
         self._names = names
-        self._scales = [Scale(config[dof], dof.label) for dof in Dof]
+        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
         self._feedback: Sequence[Feedback] = []
-        self._answers = [0, 0, 0]
+        self._answers = [0] * len(self._scales)
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
         self._last_cycle = 0.0
-        self.statistics = BusStatistics()
+        self.statistics = self._no_cycles()
+
+    def _no_cycles(self) -> BusStatistics:
+        return BusStatistics([0] * len(self._scales), [0] * len(self._scales))
 
     def begin_cycle(self) -> None:
         """Count a cycle, and the time since the one before."""
@@ -74,16 +77,16 @@ class DriveMonitor:
         statistics.cycles += 1
 
     def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
-        """Start from motors that are enabled and at rest; their positions (3,) [m, rad, rad]."""
+        """Start from motors that are enabled and at rest; their positions (n,) [m or rad]."""
         self._feedback = feedback
         self._answers = [one.answers for one in feedback]
-        self.statistics = BusStatistics()
+        self.statistics = self._no_cycles()
         start = self.positions(feedback)
         self._following.reset(start)
         return start
 
     def positions(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
-        """Position actual values (3,) [m, rad, rad]."""
+        """Position actual values (n,) [m or rad]."""
         counts = (one.position for one in feedback)
         return np.array(
             [scale.to_position(count) for scale, count in zip(self._scales, counts, strict=True)]
@@ -92,7 +95,7 @@ class DriveMonitor:
     def check(
         self, command: NDArray[np.float64], feedback: Sequence[Feedback]
     ) -> NDArray[np.float64]:
-        """Check one cycle; position actual values (3,) [m, rad, rad].
+        """Check one cycle; position actual values (n,) [m or rad].
 
         Raises:
             SilentDriveError: A drive has not answered for `heartbeat_timeout`.
@@ -101,7 +104,7 @@ class DriveMonitor:
         self._count(feedback)
         positions, fresh = self.positions(feedback), [one.age == 0 for one in feedback]
         exceeded = self._following.update(command, positions, fresh)
-        for dof in Dof:
+        for dof in self._config.all_motors:
             self._check_silence(dof, feedback[dof])
             if fresh[dof]:
                 self._check_position(dof, feedback[dof], positions[dof], bool(exceeded[dof]))
@@ -114,7 +117,7 @@ class DriveMonitor:
         Raises:
             FollowingError: A motor is outside.
         """
-        for dof, scale in zip(Dof, self._scales, strict=True):
+        for dof, scale in zip(self._config.all_motors, self._scales, strict=True):
             position = scale.to_position(counts[dof])
             lower, upper = self._config[dof].travel
             margin = self._config[dof].following_error
@@ -137,7 +140,7 @@ class DriveMonitor:
             self.statistics.late[dof] += one.age > 0
             self.statistics.lost[dof] = self.statistics.cycles - (one.answers - self._answers[dof])
 
-    def _check_silence(self, dof: Dof, feedback: Feedback) -> None:
+    def _check_silence(self, dof: Motor, feedback: Feedback) -> None:
         if feedback.silence > self._config.heartbeat_timeout:
             raise SilentDriveError(
                 self._names[dof],
@@ -146,7 +149,7 @@ class DriveMonitor:
             )
 
     def _check_position(
-        self, dof: Dof, feedback: Feedback, position: float, has_exceeded: bool
+        self, dof: Motor, feedback: Feedback, position: float, has_exceeded: bool
     ) -> None:
         axis, name, before = self._config[dof], self._names[dof], self._feedback[dof]
         is_flagged = feedback.reports_following_error

@@ -1,4 +1,4 @@
-"""Three drives that follow set-points and quick-stop whenever their context is left.
+"""Drives that follow set-points and quick-stop whenever their context is left.
 
     with open_drives(config.drives) as drives:
         position = drives.start()
@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import DrivesConfig
 from tautscope.config.microcontroller import PROTOCOL
 from tautscope.config.servos import PORTS
-from tautscope.dof import Dof
 from tautscope.errors import DriveError, SignalError, StateError
 from tautscope.extras import require_extras
 from tautscope.hardware.cia402_drives import Cia402Drives
@@ -76,7 +75,7 @@ def open_group(config: DrivesConfig) -> DriveGroup:
 
 
 class Drives:
-    """Three drives, one per DOF; for use by one thread.
+    """The drives of a rig, one per motor; for use by one thread.
 
     Args:
         config: Bus, drives, limits and timeouts.
@@ -95,13 +94,15 @@ class Drives:
         self.config = config
         self._lock = lock
         self._group = group
-        self._scales = [Scale(config[dof], dof.label) for dof in Dof]
+        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
         self._is_running = False
         self._is_closed = False
-        self._previous: NDArray[np.float64] = np.zeros(3)
+        self._previous: NDArray[np.float64] = np.zeros(len(config.all_motors))
         try:
-            self.commissioned = tuple(group.commission(dof) for dof in Dof)
-            self._monitor = DriveMonitor(config, [group.name(dof) for dof in Dof], group.pending)
+            self.commissioned = tuple(group.commission(dof) for dof in config.all_motors)
+            self._monitor = DriveMonitor(
+                config, [group.name(dof) for dof in config.all_motors], group.pending
+            )
             group.configure()
         except BaseException:
             group.close()
@@ -124,7 +125,7 @@ class Drives:
 
     @property
     def last_command(self) -> NDArray[np.float64]:
-        """(3,) [m, rad, rad] the command sent last, or the position at the start."""
+        """(n,) [m or rad] the command sent last, or the position at the start."""
         return self._previous.copy()
 
     def start(self, *, reset_faults: bool = False) -> NDArray[np.float64]:
@@ -134,7 +135,7 @@ class Drives:
             reset_faults: Reset faults of the drives. Find their cause first.
 
         Returns:
-            (3,) position actual values [m, rad, rad]; the first command starts from there.
+            (n,) position actual values [m or rad]; the first command starts from there.
 
         Raises:
             StateError: A drive is in fault, or did not reach a state within `state_timeout`.
@@ -163,10 +164,10 @@ class Drives:
         Call it every `cycle` seconds: it waits for the answers only.
 
         Args:
-            command: (3,) [m, rad, rad].
+            command: (n,) [m or rad].
 
         Returns:
-            (3,) position actual values [m, rad, rad].
+            (n,) position actual values [m or rad].
 
         Raises:
             SignalError: The command is not finite, leaves the travel or is too fast.
@@ -185,7 +186,7 @@ class Drives:
                 "drives", "a command before start() or after stop()", "Call start() first"
             )
         try:
-            setpoint = _as_vector(command)
+            setpoint = _as_vector(command, len(self._scales))
             targets = [
                 scale.checked_counts(setpoint[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
@@ -267,13 +268,13 @@ class Drives:
         return self._group.quick_stop()
 
 
-def _as_vector(command: ArrayLike) -> NDArray[np.float64]:
+def _as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:
     try:
         vector = np.array(command, dtype=np.float64)
     except (TypeError, ValueError):
         vector = np.empty(0)
-    if vector.shape != (3,):
-        raise SignalError("command", command, "three finite numbers [m, rad, rad]")
+    if vector.shape != (count,):
+        raise SignalError("command", command, f"{count} finite numbers [m or rad]")
     return vector
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import (
     BusError,
     EmergencyError,
@@ -54,7 +54,7 @@ class _Slave:
 
 
 class EthercatFieldbus:
-    """Three drives on an EtherCAT line; a `tautscope.hardware.fieldbus.Fieldbus`.
+    """Drives on an EtherCAT line; a `tautscope.hardware.fieldbus.Fieldbus`.
 
     Args:
         config: `channel` is the network adapter, `node` the position on the line, from 1.
@@ -81,7 +81,7 @@ class EthercatFieldbus:
                 "Check drives.channel; raw sockets need root or CAP_NET_RAW",
             ) from error
         found = self._master.config_init()
-        needed = max(config[dof].node for dof in Dof)
+        needed = max(config[dof].node for dof in config.all_motors)
         if found < needed:
             self.close()
             raise BusError(
@@ -93,20 +93,20 @@ class EthercatFieldbus:
             dof: _Slave(
                 f"{dof.label}, device {config[dof].node}", self._master.slaves[config[dof].node - 1]
             )
-            for dof in Dof
+            for dof in config.all_motors
         }
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """See `Fieldbus.name`."""
         return self._slaves[dof].name
 
-    def read(self, dof: Dof, entry: Entry) -> int:
+    def read(self, dof: Motor, entry: Entry) -> int:
         """Read a value by SDO upload; see `Fieldbus.read`."""
         device = self._slaves[dof].device
         data = self._request(dof, entry, lambda: device.sdo_read(entry.index, entry.subindex))
         return entry.decode(bytes(data))
 
-    def write(self, dof: Dof, entry: Entry, value: int) -> None:
+    def write(self, dof: Motor, entry: Entry, value: int) -> None:
         """Write a value by SDO download; see `Fieldbus.write`."""
         device = self._slaves[dof].device
         data = encoded(self.name(dof), entry, value, entry.size)
@@ -116,9 +116,9 @@ class EthercatFieldbus:
             lambda: device.sdo_write(entry.index, entry.subindex, data),
         )
 
-    def configure(self, modes: Mapping[Dof, Mode]) -> None:
+    def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure the mapping and the watchdog of the process data."""
-        for dof in Dof:
+        for dof in self._config.all_motors:
             self._map(dof, 0x1C12, 0x1600, (objects.CONTROLWORD, target_object(modes[dof])))
             self._map(dof, 0x1C13, 0x1A00, TX_PDO_OBJECTS)
             device = self._slaves[dof].device
@@ -134,8 +134,8 @@ class EthercatFieldbus:
     def start(self) -> None:
         """Bring the line to operational; process data flows from here on."""
         self._answered_at, self._age = time.monotonic(), 0
-        targets = [self._slaves[dof].tx_pdo.position for dof in Dof]
-        self._exchange([cia402.DISABLE_VOLTAGE] * 3, targets)
+        targets = [self._slaves[dof].tx_pdo.position for dof in self._config.all_motors]
+        self._exchange([cia402.DISABLE_VOLTAGE] * len(targets), targets)
         self._reach(self._soem.OP_STATE, "operational")
 
     def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
@@ -161,9 +161,9 @@ class EthercatFieldbus:
 
     def broadcast(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
         """See `Fieldbus.broadcast`."""
-        return self._exchange([controlword] * 3, targets)
+        return self._exchange([controlword] * len(targets), targets)
 
-    def stop_communication(self, dofs: Sequence[Dof]) -> None:
+    def stop_communication(self, dofs: Sequence[Motor]) -> None:
         """End the process data of all drives: their watchdogs stop the motors."""
         try:
             self._master.state = self._soem.SAFEOP_STATE
@@ -229,7 +229,7 @@ class EthercatFieldbus:
             self._master.send_processdata()
             self._master.receive_processdata(2_000)
 
-    def _map(self, dof: Dof, assignment: int, mapping: int, entries: tuple[Entry, ...]) -> None:
+    def _map(self, dof: Motor, assignment: int, mapping: int, entries: tuple[Entry, ...]) -> None:
         """Map one direction of the process data: invalidate, change, validate."""
         count = Entry(mapping, 0, "number of mapped objects", 1)
         pdos = Entry(assignment, 0, "number of assigned PDOs", 1)
@@ -242,7 +242,7 @@ class EthercatFieldbus:
         self.write(dof, pdos, 1)
         verify_setting(self, dof, count, len(entries))
 
-    def _request(self, dof: Dof, what: object, transfer: Callable[[], Any]) -> Any:
+    def _request(self, dof: Motor, what: object, transfer: Callable[[], Any]) -> Any:
         name = self.name(dof)
         try:
             return transfer()

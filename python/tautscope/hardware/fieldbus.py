@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from tautscope.config import DrivesConfig
 from tautscope.config.drives import WAIVERS, waiver_hint
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import SettingRefusedError
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import FOLLOWING_ERROR_BIT, Mode
@@ -107,17 +107,17 @@ def require_waived(config: DrivesConfig, entry: Entry, error: SettingRefusedErro
 
 
 class Fieldbus(Protocol):
-    """Three drives, one per DOF, on one bus.
+    """The drives of a rig, one per motor, on one bus.
 
     Every method may raise `tautscope.errors.DriveError`: the bus is lost, or a drive does not
     answer, has sent an emergency object or no heartbeat.
     """
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """The drive's name for messages: DOF and node."""
         ...
 
-    def read(self, dof: Dof, entry: Entry) -> int:
+    def read(self, dof: Motor, entry: Entry) -> int:
         """Read a value from a drive's object dictionary.
 
         Raises:
@@ -125,7 +125,7 @@ class Fieldbus(Protocol):
         """
         ...
 
-    def write(self, dof: Dof, entry: Entry, value: int) -> None:
+    def write(self, dof: Motor, entry: Entry, value: int) -> None:
         """Write a value to a drive's object dictionary; it is not read back.
 
         Raises:
@@ -134,7 +134,7 @@ class Fieldbus(Protocol):
         """
         ...
 
-    def configure(self, modes: Mapping[Dof, Mode]) -> None:
+    def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure connection supervision and process data; the drives stay disabled."""
         ...
 
@@ -153,7 +153,7 @@ class Fieldbus(Protocol):
         """Like `exchange` with one controlword for all drives, without any fault check."""
         ...
 
-    def stop_communication(self, dofs: Sequence[Dof]) -> None:
+    def stop_communication(self, dofs: Sequence[Motor]) -> None:
         """End communication so that the drives' own supervision stops them; raises nothing."""
         ...
 
@@ -162,7 +162,7 @@ class Fieldbus(Protocol):
         ...
 
 
-def verify_setting(bus: Fieldbus, dof: Dof, entry: Entry, value: int) -> None:
+def verify_setting(bus: Fieldbus, dof: Motor, entry: Entry, value: int) -> None:
     """Read a setting back.
 
     Raises:

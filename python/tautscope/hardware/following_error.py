@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
 
 Floats = NDArray[np.float64]
 
@@ -34,37 +33,37 @@ class FollowingErrorMonitor:
         pending: Number of newest commands that cannot have an effect yet when positions are read.
 
     Attributes:
-        lower: Smallest recent command (3,) [m, rad, rad].
-        upper: Largest recent command (3,) [m, rad, rad].
-        error: Following error (3,) [m, rad, rad]; 0 or less inside the range.
+        lower: Smallest recent command (n,) [m or rad].
+        upper: Largest recent command (n,) [m or rad].
+        error: Following error (n,) [m or rad]; 0 or less inside the range.
     """
 
     def __init__(self, config: DrivesConfig, period: float, pending: int = 0) -> None:
-        self._limit = np.array([config[dof].following_error for dof in Dof])
-        self._window = np.array([config[dof].following_window for dof in Dof])
+        self._limit = np.array([config[dof].following_error for dof in config.all_motors])
+        self._window = np.array([config[dof].following_window for dof in config.all_motors])
         # 1e-9: rounding of the quotient must not add a command.
         commands = 1 + math.ceil(config.lag / period - 1e-9) + pending
         self._timeout = round(config.following_timeout / period)
-        self._recent = np.zeros((commands, 3))
+        self._recent = np.zeros((commands, len(self._limit)))
         self._next = 0
-        self._outside_count = np.zeros(3, dtype=np.intp)
-        self.reset(np.zeros(3))
+        self._outside_count = np.zeros(len(self._limit), dtype=np.intp)
+        self.reset(np.zeros(len(self._limit)))
 
     def reset(self, position: Floats) -> None:
-        """Start at rest at a position (3,) [m, rad, rad]."""
+        """Start at rest at a position (n,) [m or rad]."""
         self._recent[:] = position
         self._outside_count[:] = 0
         self.lower = self.upper = position
-        self.error: Floats = np.zeros(3)
+        self.error: Floats = np.zeros(len(self._limit))
 
     def update(
-        self, command: Floats, positions: Floats, fresh: Sequence[bool] = (True, True, True)
+        self, command: Floats, positions: Floats, fresh: Sequence[bool] | bool = True
     ) -> NDArray[np.bool_]:
-        """Take one period; true (3,) for each motor whose following error is too large.
+        """Take one period; true (n,) for each motor whose following error is too large.
 
         Args:
-            command: The command sent in this period (3,) [m, rad, rad].
-            positions: Position actual values (3,) [m, rad, rad].
+            command: The command sent in this period (n,) [m or rad].
+            positions: Position actual values (n,) [m or rad].
             fresh: Whether each position is new; an old one is not checked, and its timer is held.
         """
         self._recent[self._next] = command

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config, DrivesConfig
-from tautscope.dof import Dof, NamedDof
+from tautscope.dof import Dof, Motor, NamedDof
 from tautscope.errors import STOPPED, FieldError, SignalError, TautscopeError
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.signals import exit_on_signals
@@ -19,7 +19,7 @@ from tautscope.loop.rig import Rig, check_sample
 DURATION = 4.0
 """Duration of the motion out and back [s]."""
 LARGEST = (2e-3, 0.2, 0.2)
-"""Largest distance of a first test of the article's DOFs [m, rad, rad]."""
+"""Largest distance of a first test of the article's DOFs [m or rad]."""
 _RESTS = ((0.0, 0.1), (0.45, 0.55), (0.9, 1.0))
 """Parts of the motion in which it rests: at its start, out and back [share of it]."""
 
@@ -36,7 +36,7 @@ def check_distance(dof: NamedDof, distance: float) -> None:
         raise FieldError("distance", distance, f"at most {largest:g} m or rad, and not 0")
 
 
-def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
+def jog(config: DrivesConfig, dof: Motor, distance: float) -> tuple[float, float]:
     """Move a motor along raised cosines by `distance` [m or rad] and back, with `_RESTS`.
 
     THE MOTOR MOVES. It is quick-stopped at the end, and on every error.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from tautscope.config import CameraConfig, Config
-from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.drives import open_group
 
@@ -37,7 +36,11 @@ def read_serial_numbers(config: Config) -> dict[str, str]:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
     group = open_group(config.drives)
     try:
-        drives = {dof.label: number for dof in Dof if (number := group.serial_number(dof))}
+        drives = {
+            motor.label: number
+            for motor in config.drives.all_motors
+            if (number := group.serial_number(motor))
+        }
     finally:
         group.close()
     return camera_serial_number(config.camera) | drives

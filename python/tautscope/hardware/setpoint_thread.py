@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
 from tautscope.errors import StateError
 from tautscope.hardware.drive_monitor import outside_travel
 from tautscope.hardware.realtime import SETPOINTS, realtime
@@ -28,11 +27,11 @@ class Motors(AbstractContextManager["Motors"], Protocol):
     """The part of `tautscope.hardware.drives.Drives` that this thread uses."""
 
     def start(self) -> Floats:
-        """Enable the motors; their positions (3,) [m, rad, rad]."""
+        """Enable the motors; their positions (n,) [m or rad]."""
         ...
 
     def exchange(self, command: ArrayLike) -> Floats:
-        """Send a set-point (3,) and read the positions (3,) [m, rad, rad]."""
+        """Send a set-point (n,) and read the positions (n,) [m or rad]."""
         ...
 
     def disable(self) -> None:
@@ -51,12 +50,16 @@ class SetpointThread:
     Args:
         config: Cycle, limits, timeouts.
         motors: Opens the drives; called in the thread, the only one that uses them.
-        start: (3,) start position [m, rad, rad].
+        start: (n,) start position [m or rad]; None if the motors stay where they are.
         timing: Records every cycle from the first command on.
     """
 
     def __init__(
-        self, config: DrivesConfig, motors: Callable[[], Motors], start: Floats, timing: Timing
+        self,
+        config: DrivesConfig,
+        motors: Callable[[], Motors],
+        start: Floats | None,
+        timing: Timing,
     ) -> None:
         self._config = config
         self._motors = motors
@@ -73,7 +76,7 @@ class SetpointThread:
         self._thread = threading.Thread(target=self._run, name="set-points")
 
     def start(self) -> Floats:
-        """Move to the start; the positions reached (3,) [m, rad, rad].
+        """Move to the start; the positions reached (n,) [m or rad].
 
         Raises:
             TautscopeError: The drives failed; the motors are stopped.
@@ -86,7 +89,7 @@ class SetpointThread:
         """Queue the next set-point and wait until it is sent and answered.
 
         Returns:
-            Time at which it was sent [s, monotonic clock], and the positions (3,) [m, rad, rad].
+            Time at which it was sent [s, monotonic clock], and the positions (n,) [m or rad].
 
         Raises:
             StateError: The thread has stopped.
@@ -150,12 +153,16 @@ class SetpointThread:
     def _move_to_start(self, motors: Motors, position: Floats) -> None:
         """Move along half a cosine to the start, at `start_speed` of the speed limits at most."""
         config = self._config
-        for dof in Dof:
+        for dof in self._config.all_motors:
             axis, at = config[dof], float(position[dof])
             if not axis.travel[0] <= at <= axis.travel[1]:
                 raise outside_travel(f"{dof.label}, node {axis.node}", dof, at, axis.travel)
+        self._start = position if self._start is None else self._start
         distance = self._start - position
-        speeds = np.array([config[dof].speed_limit for dof in Dof]) * config.start_speed
+        speeds = (
+            np.array([config[dof].speed_limit for dof in self._config.all_motors])
+            * config.start_speed
+        )
         # The peak speed of the cosine is pi / 2 times its mean.
         duration = float(np.max(np.abs(distance) / speeds)) * math.pi / 2
         count = math.ceil(duration / config.cycle) + 1
@@ -172,6 +179,7 @@ class SetpointThread:
             self._condition.notify_all()
 
     def _stream(self, motors: Motors) -> None:
+        assert self._start is not None
         command, last_command_at = self._start, time.monotonic()
         while not self._must_stop():
             with self._condition:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tautscope.config import Config, DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import CalibrationError, FollowingError
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
@@ -32,7 +32,7 @@ class Stops:
     lower: float
     upper: float
 
-    def changes(self, config: DrivesConfig, dof: Dof) -> dict[str, object]:
+    def changes(self, config: DrivesConfig, dof: Motor) -> dict[str, object]:
         """What the stops change in the configuration, by dotted path.
 
         Without stops in the configuration: the stops, and a travel between them. Else ``home``,
@@ -41,7 +41,7 @@ class Stops:
         Raises:
             CalibrationError: The distance between the stops has changed.
         """
-        axis, width, path = config[dof], self.upper - self.lower, f"drives.{dof.label}"
+        axis, width, path = config[dof], self.upper - self.lower, f"{dof.key}"
         if axis.stops is None:
             inside = np.clip(
                 axis.travel, self.lower + _MARGIN * width, self.upper - _MARGIN * width
@@ -59,7 +59,7 @@ class Stops:
         return {f"{path}.home": round(axis.home + axis.stops[0] - self.lower, 6)}
 
 
-def find_stops(config: Config, dof: Dof, torque: float) -> Stops:
+def find_stops(config: Config, dof: Motor, torque: float) -> Stops:
     """Drive a motor slowly against both stops, and back to where it was.
 
     THE MOTOR MOVES. Its torque is limited; the stop is where its following error becomes too large.
@@ -76,10 +76,10 @@ def find_stops(config: Config, dof: Dof, torque: float) -> Stops:
     return Stops(*ends)
 
 
-def _search_config(config: Config, dof: Dof, torque: float) -> DrivesConfig:
+def _search_config(config: Config, dof: Motor, torque: float) -> DrivesConfig:
     """The drives with little torque and a travel that hardly ends."""
     assert config.drives is not None
-    axis, path = config.drives[dof], f"drives.{dof.label}"
+    axis, path = config.drives[dof], f"{dof.key}"
     reach = (1 + _REACH) * (axis.travel[1] - axis.travel[0])
     # A restarted servo reports a position within its first turn, wherever that is in the DOF.
     turn = sorted(Scale(axis, dof.label).to_position(count) for count in (0, COUNTS_PER_TURN))
@@ -96,7 +96,7 @@ def _search_config(config: Config, dof: Dof, torque: float) -> DrivesConfig:
     return drives
 
 
-def _seek_stop(config: DrivesConfig, dof: Dof, direction: int, begin: float) -> float:
+def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -> float:
     """Drive against the stop in a direction, and back to the begin; the position of the stop."""
     step = direction * _SPEED_SHARE * config[dof].speed_limit * config.cycle
     reach = _REACH / (3 + 2 * _REACH) * (config[dof].travel[1] - config[dof].travel[0])
@@ -118,7 +118,7 @@ def _seek_stop(config: DrivesConfig, dof: Dof, direction: int, begin: float) -> 
         return at
     raise CalibrationError(
         f"{dof.label}: no stop on a way of {reach:.4g} from {begin:.4g}",
-        f"Give drives.{dof.label}.travel about the width between its stops, or more torque",
+        f"Give {dof.key}.travel about the width between its stops, or more torque",
     )
 
 

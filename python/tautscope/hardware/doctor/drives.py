@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tautscope.config import DrivesConfig
 from tautscope.config.microcontroller import SERIAL_PORTS
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
 from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
@@ -71,11 +71,11 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
     try:
         findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
         findings += _check_latency(config)
-        findings += [_check_drive(group, config, dof) for dof in Dof]
+        findings += [_check_drive(group, config, dof) for dof in config.all_motors]
         if any(finding.status == "missing" for finding in findings):
             return findings
         settings = []
-        for dof in Dof:
+        for dof in config.all_motors:
             try:
                 settings.append(_settings(group.commission(dof), config))
             except DriveError as error:
@@ -104,7 +104,7 @@ def _check_latency(config: DrivesConfig) -> list[CheckResult]:
     return [CheckResult("drives", what, "missing", f"{found} ms", todo)]
 
 
-def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Dof) -> CheckResult:
+def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckResult:
     """Read state and position of one drive without writing to it."""
     what = group.name(dof)
     try:
@@ -124,7 +124,7 @@ def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Dof) -> CheckResu
     todo = status.problem
     if not todo and not lower <= position <= upper:
         todo = (
-            f"Move it by hand into drives.{dof.label}.travel, {scale * lower:.4g} to "
+            f"Move it by hand into {dof.key}.travel, {scale * lower:.4g} to "
             f"{scale * upper:.4g} {unit}; or correct home, sign or counts_per_unit"
         )
     return CheckResult("drives", what, "missing" if todo else "ok", found, todo, data)
@@ -148,7 +148,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
     """Run cycles as in an experiment, in which no motor is enabled."""
     group.start(group.read_positions())
     times: list[float] = []
-    late, answers = 0, [0, 0, 0]
+    late, answers = 0, [0] * len(config.all_motors)
     end = time.monotonic() + max(CYCLES * config.cycle, 1.5 * config.heartbeat_timeout)
     while (began := time.monotonic()) < end:
         feedback = group.probe()
@@ -156,7 +156,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
         late += sum(one.age > 0 for one in feedback)
         answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
-    silent = [group.name(dof) for dof in Dof if not answers[dof]]
+    silent = [group.name(dof) for dof in config.all_motors if not answers[dof]]
     what = "answers" if config.protocol in SERIAL_PORTS else "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:
@@ -167,7 +167,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
     found = (
         f"{'' if config.protocol in SERIAL_PORTS else every}{len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
-        f"{late} of {3 * len(times)} late"
+        f"{late} of {len(config.all_motors) * len(times)} late"
     )
     if late:
         todo = "Expected: none, with real-time priority and no other load"

@@ -1,4 +1,4 @@
-"""Three motors behind a microcontroller: a `tautscope.hardware.drive_group.DriveGroup`.
+"""Motors behind a microcontroller: a `tautscope.hardware.drive_group.DriveGroup`.
 
 Each cycle is one request with the set-points of all axes, which is answered at once by all
 positions and the state. The microcontroller stops the motors by itself if no set-points come for
@@ -11,7 +11,7 @@ import struct
 import time
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import (
     DriveError,
     EmergencyError,
@@ -34,7 +34,7 @@ _FAULT = "Find the cause, then start with reset_faults"
 
 
 class SerialDrives:
-    """Three motors behind a microcontroller.
+    """Motors behind a microcontroller.
 
     Args:
         config: Axes, limits and timeouts.
@@ -51,7 +51,7 @@ class SerialDrives:
         self._config = config
         self._name = f"microcontroller on {config.channel}"
         self._line = SerialLine(port, config.channel)
-        self._feedback = [NewestAnswer() for _ in Dof]
+        self._feedback = [NewestAnswer() for _ in config.all_motors]
         self._targets: list[int] = []
         self._sent_at = 0.0
         self._is_moving = self._was_enabled = False
@@ -61,15 +61,15 @@ class SerialDrives:
             self.close()
             raise
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """See `DriveGroup.name`."""
         return f"{dof.label}, axis {self._config[dof].node}"
 
-    def serial_number(self, dof: Dof) -> str:
+    def serial_number(self, dof: Motor) -> str:
         """Motors have none."""
         return ""
 
-    def status(self, dof: Dof) -> DriveStatus:
+    def status(self, dof: Motor) -> DriveStatus:
         """Read state, fault and position.
 
         Raises:
@@ -86,7 +86,7 @@ class SerialDrives:
         data = {"state": state, "fault": fault, "limits": limits._asdict()}
         return DriveStatus(status.positions[at], found, problem, data=data)
 
-    def commission(self, dof: Dof) -> CommissionedDrive:
+    def commission(self, dof: Motor) -> CommissionedDrive:
         """Compare travel and speed limit with the limits of the microcontroller.
 
         Raises:
@@ -117,7 +117,7 @@ class SerialDrives:
     def read_positions(self) -> list[int]:
         """Read the positions."""
         status = self._ask(Request.READ)
-        return [status.positions[self._config[dof].node - 1] for dof in Dof]
+        return [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
 
     def start(self, positions: list[int]) -> None:
         """See `DriveGroup.start`."""
@@ -146,7 +146,7 @@ class SerialDrives:
             what = f"it stays {_name(State, status.state)}: {_name(Refusal, status.refusal)}"
             raise StateError(self._name, what, "Check its program; power-cycle it")
         self._targets = list(status.positions)
-        targets = [status.positions[self._config[dof].node - 1] for dof in Dof]
+        targets = [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
         self.start(targets)
         return self.exchange(targets)
 
@@ -162,7 +162,7 @@ class SerialDrives:
         pause, self._sent_at = now - self._sent_at, now
         if pause > self._config.heartbeat_timeout:
             raise self._paused(pause)
-        for dof, target in zip(Dof, targets, strict=True):
+        for dof, target in zip(self._config.all_motors, targets, strict=True):
             self._targets[self._config[dof].node - 1] = target
         self._receive(self._line.send(Request.SETPOINTS, frames.setpoints(self._targets)))
         return self._feedback
@@ -209,12 +209,12 @@ class SerialDrives:
             "docs/serial.md is loaded",
         )
 
-    def _limits(self, dof: Dof) -> Limits:
+    def _limits(self, dof: Motor) -> Limits:
         if self._config[dof].node > len(self._axes):
             raise SettingRefusedError(
                 self.name(dof),
                 f"the microcontroller has {len(self._axes)} axes",
-                f"Correct drives.{dof.label}.node",
+                f"Correct {dof.key}.node",
             )
         return self._axes[self._config[dof].node - 1]
 
@@ -236,7 +236,7 @@ class SerialDrives:
                 return []
         except DriveError:
             pass  # silent, or the port is lost
-        return [self.name(dof) for dof in Dof]
+        return [self.name(dof) for dof in self._config.all_motors]
 
     def _receive(self, number: int) -> None:
         """Wait for an answer; late ones to earlier requests count too."""
@@ -248,7 +248,7 @@ class SerialDrives:
         for status in answers:
             if status is None:
                 continue
-            for dof, one in zip(Dof, self._feedback, strict=True):
+            for dof, one in zip(self._config.all_motors, self._feedback, strict=True):
                 one.position = status.positions[self._config[dof].node - 1]
                 one.silence, one.answered_at = 0.0, now
                 one.answers += 1
@@ -274,7 +274,7 @@ class SerialDrives:
     def _check_faults(self, status: frames.Status, error: type[DriveError]) -> None:
         for at, fault in enumerate(status.faults):
             if fault:
-                dofs = [dof for dof in Dof if self._config[dof].node == at + 1]
+                dofs = [dof for dof in self._config.all_motors if self._config[dof].node == at + 1]
                 name = self.name(dofs[0]) if dofs else f"axis {at + 1}"
                 raise error(name, f"it reports a fault: {_fault_name(fault)}", _FAULT)
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from tautscope.config import DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN, MODELS
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import ModeRefusedError, SettingRefusedError, SilentDriveError, StateError
 from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
 from tautscope.hardware.scale import Scale
@@ -36,7 +36,7 @@ class Servo:
     lost.
     """
 
-    def __init__(self, config: DrivesConfig, dof: Dof, line: ServoLine) -> None:
+    def __init__(self, config: DrivesConfig, dof: Motor, line: ServoLine) -> None:
         self._config, self._dof, self._line = config, dof, line
         self._family = FAMILIES[config.protocol]
         self._axis = config[dof]
@@ -99,7 +99,7 @@ class Servo:
         if furthest > self._family.largest:
             raise SettingRefusedError(
                 self.name,
-                f"drives.{self._dof.label}.travel is up to {furthest} counts from 0",
+                f"{self._dof.key}.travel is up to {furthest} counts from 0",
                 f"It counts to {self._family.largest}: correct travel, home or counts_per_unit",
             )
         settings = self._family.settings(self._axis, scale.speed_counts())
@@ -140,7 +140,7 @@ class Servo:
             raise StateError(
                 self.name,
                 f"its position changed from {before} to {position} counts by the reset",
-                f"It has forgotten its turns: correct drives.{self._dof.label}.home, or "
+                f"It has forgotten its turns: correct {self._dof.key}.home, or "
                 "tautscope calibrate stops",
             )
         return position
@@ -172,7 +172,7 @@ class Servo:
             )
 
     def _wrong_model(self, number: int) -> tuple[str, str]:
-        path = f"drives.{self._dof.label}"
+        path = f"{self._dof.key}"
         return (
             f"it is a {_model_name(number)}, not a {self._model} ({MODELS[self._model].number})",
             f"Correct {path}.model or {path}.node",
@@ -184,7 +184,7 @@ class Servo:
         except NoAnswerError:
             remedy = "Check its supply and cable"
             if self.may_search:
-                remedy += f", drives.{self._dof.label}.node and drives.bitrate: "
+                remedy += f", {self._dof.key}.node and drives.bitrate: "
                 remedy += self._line.search()
             raise SilentDriveError(self.name, "no answer", remedy) from None
 

@@ -1,4 +1,4 @@
-"""Three servos on a serial line: a `tautscope.hardware.drive_group.DriveGroup`.
+"""Servos on a serial line: a `tautscope.hardware.drive_group.DriveGroup`.
 
 Each cycle is one sync write of the set-points and one sync read of the positions; each answer says
 whether its servo has a fault. A servo in position mode holds its last set-point. Of the two
@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 
 from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
+from tautscope.dof import Motor
 from tautscope.errors import DriveError, EmergencyError, StateError
 from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus, NewestAnswer
 from tautscope.hardware.servos.families import FAMILIES, Register
@@ -23,7 +23,7 @@ _WATCHDOG_UNIT = 0.02
 
 
 class ServoDrives:
-    """Three servos on a serial line.
+    """Servos on a serial line.
 
     Args:
         config: Port, ids, models, limits and timeouts.
@@ -39,26 +39,26 @@ class ServoDrives:
         self._config = config
         self._family = family = FAMILIES[config.protocol]
         self._line = ServoLine(config, family)
-        self._servos = [Servo(config, dof, self._line) for dof in Dof]
+        self._servos = [Servo(config, dof, self._line) for dof in config.all_motors]
         self._ids = [servo.id for servo in self._servos]
-        self._feedback = [NewestAnswer() for _ in Dof]
-        self._goals = [0, 0, 0]
+        self._feedback = [NewestAnswer() for _ in config.all_motors]
+        self._goals = [0] * len(config.all_motors)
         self._sent_at = 0.0
         self._has_lost_answers = self._is_moving = self._was_enabled = False
 
-    def name(self, dof: Dof) -> str:
+    def name(self, dof: Motor) -> str:
         """See `DriveGroup.name`."""
         return self._servos[dof].name
 
-    def serial_number(self, dof: Dof) -> str:
+    def serial_number(self, dof: Motor) -> str:
         """Servos have none."""
         return ""
 
-    def status(self, dof: Dof) -> DriveStatus:
+    def status(self, dof: Motor) -> DriveStatus:
         """See `Servo.status`."""
         return self._servos[dof].status()
 
-    def commission(self, dof: Dof) -> CommissionedDrive:
+    def commission(self, dof: Motor) -> CommissionedDrive:
         """See `Servo.commission`."""
         return self._servos[dof].commission()
 
@@ -86,7 +86,7 @@ class ServoDrives:
         """See `DriveGroup.enable`."""
         family = self._family
         self._line.set_timeout(self._config.request_timeout)
-        for dof, servo in zip(Dof, self._servos, strict=True):
+        for dof, servo in zip(self._config.all_motors, self._servos, strict=True):
             if faults := servo.read(family.faults):
                 if not reset_faults:
                     raise StateError(servo.name, *servo.fault(faults))
@@ -136,14 +136,16 @@ class ServoDrives:
         goals = [one.position for one in self._feedback]
         unconfirmed = self._command_until(self._family.goal, goals)
         if self._config.after_quick_stop == "release" and not unconfirmed:
-            return self._command_until(self._family.torque, [0, 0, 0])
+            return self._command_until(self._family.torque, [0] * len(self._servos))
         return unconfirmed
 
     def disable(self) -> list[str]:
         """Stop, then switch the torque off."""
         if not self._was_enabled:
             return []
-        return self.quick_stop() or self._command_until(self._family.torque, [0, 0, 0])
+        return self.quick_stop() or self._command_until(
+            self._family.torque, [0] * len(self._servos)
+        )
 
     def close(self) -> None:
         """Release the port; a second call does nothing."""
@@ -151,7 +153,7 @@ class ServoDrives:
 
     def _command_until(self, register: Register, values: list[int]) -> list[str]:
         """Repeat a sync write until each servo has the value; names of those that do not."""
-        pending = set(Dof)
+        pending = set(self._config.all_motors)
         deadline = time.monotonic() + self._config.state_timeout
         try:
             self._line.set_timeout(self._config.reply_timeout)
@@ -181,9 +183,9 @@ class ServoDrives:
             else:
                 answers += self._line.read_all(self._ids, self._family.position)
         except NoAnswerError:
-            answers = [None] * len(Dof)
+            answers = [None] * len(self._config.all_motors)
         now = time.monotonic()
-        for dof, answer in zip(Dof, answers, strict=True):
+        for dof, answer in zip(self._config.all_motors, answers, strict=True):
             one = self._feedback[dof]
             if answer is None:
                 self._has_lost_answers = True
@@ -192,7 +194,7 @@ class ServoDrives:
             one.age, one.silence, one.answered_at = 0, 0.0, now
             one.answers += 1
             one.position = answer[0]
-        for dof, answer in zip(Dof, answers, strict=True):
+        for dof, answer in zip(self._config.all_motors, answers, strict=True):
             if answer is not None and self._is_moving:
                 self._check_faults(dof, answer[1])
 
@@ -202,7 +204,7 @@ class ServoDrives:
         except NoAnswerError:
             return None
 
-    def _check_faults(self, dof: Dof, error: int) -> None:
+    def _check_faults(self, dof: Motor, error: int) -> None:
         faults, servo = error, self._servos[dof]
         if self._family.alert:
             if not error & self._family.alert:
