@@ -21,7 +21,7 @@ project = "tautscope"
 author = copyright = "The tautscope authors"
 version = release = PACKAGE["version"]
 root_doc = "docs/site/index"
-include_patterns = ["*.md", "docs/*.md", "docs/*/*.md", "docs/notebooks/*.ipynb"]
+include_patterns = ["*.md", "rigs/*/*.md", "docs/*.md", "docs/*/*.md", "docs/notebooks/*.ipynb"]
 exclude_patterns = [".*", "target", "crates", "python", "tests", "benchmarks", "fuzz", "paper"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinxarg.ext"]
 

@@ -11,13 +11,20 @@ import tautscope
 from common.paths import ROOT
 from tautscope.cli import _parser
 
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "paper" / "paper.md"])
+PAGES = sorted(
+    [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
+        *(ROOT / "rigs").rglob("*.md"),
+        ROOT / "paper" / "paper.md",
+    ]
+)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAPER = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 
 REFERENCE = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 """`file::name`, the file from the repository's root."""
-FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "ros", "tests")
+FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "rigs", "ros", "tests")
 TREE_PATH = re.compile(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)(?:::\w+)?`")
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)")
 

@@ -26,8 +26,8 @@ def test_every_page_is_in_the_list_of_pages() -> None:
     paths = {(INDEX.parent / name).resolve() for name in listed}
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *NOTEBOOKS]
     pages += (ROOT / "docs" / "interfaces").glob("*.md")
+    pages += (ROOT / "rigs").rglob("*.md")
     pages += [page for page in INDEX.parent.glob("*.md") if page != INDEX]
-    pages += (ROOT / "docs" / "interfaces").glob("*.md")
     assert {page.with_suffix("") for page in pages} == paths
 
 

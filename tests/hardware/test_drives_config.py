@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
-from common.paths import ROOT
 from drive_settings import AXES, drives_config, drives_document
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
@@ -103,27 +100,24 @@ def test_import_loads_no_bus_library() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_documented_configurations_are_valid() -> None:
-    page = ROOT / "docs" / "hardware.md"
-    blocks = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    of_can, *of_servos = (from_document(tomllib.loads(block)).drives for block in blocks)
-    assert of_can is not None
-    # 4096 counts per turn, gear ratio 20:1, divided by 2 pi.
-    assert of_can.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)
-    assert [one.protocol for one in of_servos if one] == ["dynamixel", "feetech", "serial"]
-    for block, drives in zip(blocks[1:], of_servos, strict=True):
-        assert len(block.splitlines()) <= 15
-        assert drives is not None
-        for dof in Dof:  # every travel begins within the first turn
-            assert 0 <= Scale(drives[dof], dof.label).to_counts(0.0) < 4096
-
-
 SERVO = {
     "protocol": "feetech",
     "insertion": {"node": 1, "model": "STS3215", "counts_per_unit": 1e5, "travel": [0.0, 0.04]},
     "rotation": {"node": 2, "model": "STS3215", "travel": [-3.0, 3.0]},
     "bending": {"node": 3, "model": "STS3215", "travel": [0.0, 2.0]},
 }
+
+
+def test_limits_of_following_errors_have_defaults() -> None:
+    axis = {"node": 1, "counts_per_unit": 1e5, "travel": [-0.01, 0.04], "speed_limit": 0.1}
+    axes = {"rotation": axis | {"node": 2, "following_error": 0.002}, "bending": axis | {"node": 3}}
+    drives = from_document({"drives": {"insertion": axis, **axes}}).drives
+    assert drives is not None
+    # 1 % of 50 mm, and half of it for longer; half of what is given.
+    assert drives.insertion.following_error == pytest.approx(0.5e-3)
+    assert drives.insertion.following_window == pytest.approx(0.25e-3)
+    assert drives.rotation.following_window == pytest.approx(1e-3)
+    assert drives.insertion.sign == 1
 
 
 def test_servos_have_defaults_in_units_of_the_dof() -> None:

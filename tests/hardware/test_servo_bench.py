@@ -39,8 +39,13 @@ CYCLE = TIMES["cycle"]
 
 
 def bench_config(protocol: str, folder: Path) -> Config:
-    """The shipped configuration with slow cycles and long timeouts, for a busy computer."""
-    document = to_document(load_config(f"bench_{protocol}"))
+    """The shipped configuration of a bench, as `slow_config`."""
+    return slow_config(f"bench_{protocol}", folder)
+
+
+def slow_config(name: str, folder: Path) -> Config:
+    """A shipped configuration with slow cycles and long timeouts, for a busy computer."""
+    document = to_document(load_config(name))
     document["control"]["period"] = CYCLE
     document["drives"] |= {
         "channel": str(folder / "servos"),
@@ -48,7 +53,12 @@ def bench_config(protocol: str, folder: Path) -> Config:
         "start_speed": 0.5,
         **TIMES,
     }
-    document["camera"]["source"] |= {"url": f"unix:{folder / 'video'}"}
+    document["camera"]["source"] |= {
+        "url": f"unix:{folder / 'video'}",
+        "format": "nut",
+        "options": {},
+        "clock": "device",
+    }
     document["camera"]["source"] |= dict.fromkeys(
         ("timeout", "start_timeout", "lost_timeout"), TIMEOUT
     )

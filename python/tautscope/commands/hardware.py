@@ -13,6 +13,7 @@ from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
 from tautscope.commands.result_lines import print_results
 from tautscope.commands.rig_choice import add_rig, choose_rig
+from tautscope.commands.run_protocol import add_protocol, apply_protocol, write_environment
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
@@ -46,6 +47,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="N",
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
+    add_protocol(run)
     add_reference(run, "the article's experiment")
     add_rig(
         run,
@@ -64,6 +66,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
+    apply_protocol(options)
     if options.rig is not None:
         if options.reference is not None or options.periods is not None or options.compare:
             what = "neither --reference nor --periods nor --compare"
@@ -93,6 +96,8 @@ def _run(options: argparse.Namespace) -> int:
         print("\n".join(["Interrupted. The motors are stopped.", *notes]), file=sys.stderr)
         return 130
     write_run_folder(found, folder)
+    if options.protocol == "desktop":
+        write_environment(options, config, folder)
     if options.json:
         print_json({"folder": str(folder), **found.to_json()})
         return 0

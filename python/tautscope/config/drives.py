@@ -41,8 +41,8 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """One motor and its drive.
 
     Values without a default depend on the rig. A servo needs only `node`, `model`, `travel`, and
-    for insertion `counts_per_unit`; a motor behind a microcontroller `node`, `counts_per_unit`,
-    `travel` and `speed_limit`.
+    for insertion `counts_per_unit`; another motor `node`, `counts_per_unit`, `travel` and
+    `speed_limit`.
     """
 
     node: Annotated[int, Meta(ge=1, le=127)]
@@ -52,17 +52,17 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Encoder counts per m or rad of the instrument's DOF, including gears. A servo has 4096 per
     turn of its horn; without gears these are 651.9 per rad, the default of servos."""
     sign: Literal[-1, 1]
-    """1 if the counts increase with the DOF, else -1."""
+    """1, the default, if the counts increase with the DOF, else -1."""
     travel: tuple[float, float]
     """Smallest and largest position [m or rad]; set in the drive and checked for every command."""
     speed_limit: Positive
     """Largest speed [m/s or rad/s]; set in the drive and checked for every command."""
     following_error: Positive
-    """Largest distance of the motor from all commands of the last `lag` [m or rad]; behind a
-    microcontroller, by default 1 % of the width of `travel`."""
+    """Largest distance of the motor from all commands of the last `lag` [m or rad]; by default 1 %
+    of the width of `travel`, of a servo 64 counts."""
     following_window: Positive
     """Largest distance that may last longer than `following_timeout` [m or rad]; at most
-    `following_error`."""
+    `following_error`, and by default half of it."""
     home: float = 0.0
     """Position of the DOF at 0 counts [m or rad]."""
     eds: str | None = None

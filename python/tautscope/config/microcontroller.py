@@ -1,4 +1,4 @@
-"""What a section ``drives`` has by default if its motors are behind a microcontroller."""
+"""What a section ``drives`` has by default: behind a microcontroller, and of every motor."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ _FOLLOWING_SHARE = 0.01
 """`AxisConfig.following_error` over the width of the travel."""
 
 
-def with_microcontroller_defaults(drives: dict[str, Any]) -> dict[str, Any]:
-    """The document of a section ``drives``, with the defaults of the serial line if it has one."""
-    if drives.get("protocol") != PROTOCOL:
-        return drives
-    filled = {"channel": SERIAL_PORTS[PROTOCOL], "bitrate": _BITRATE, "lag": LAG, **drives}
+def with_axis_defaults(drives: dict[str, Any]) -> dict[str, Any]:
+    """The document of a section ``drives``, with the defaults of any motor and the serial line."""
+    line = {"channel": SERIAL_PORTS[PROTOCOL], "bitrate": _BITRATE, "lag": LAG}
+    filled = (line if drives.get("protocol") == PROTOCOL else {}) | drives
     return with_motor_defaults(filled, _with_defaults)
 
 
@@ -30,6 +29,9 @@ def _with_defaults(_: str, axis: dict[str, Any]) -> dict[str, Any]:
     defaults: dict[str, Any] = {"sign": 1}
     match axis.get("travel"):
         case [float() | int() as lower, float() | int() as upper] if lower < upper:
-            error = _FOLLOWING_SHARE * (upper - lower)
-            defaults |= {"following_error": error, "following_window": error / 2}
-    return defaults | axis
+            defaults["following_error"] = _FOLLOWING_SHARE * (upper - lower)
+    defaults |= axis
+    match defaults.get("following_error"):
+        case float() | int() as error:
+            defaults = {"following_window": error / 2} | defaults
+    return defaults

@@ -20,7 +20,7 @@ from tautscope.config.estimation import EstimationConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.law import LawConfig
-from tautscope.config.microcontroller import with_microcontroller_defaults
+from tautscope.config.microcontroller import with_axis_defaults
 from tautscope.config.presets import with_preset
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
@@ -143,7 +143,7 @@ def _checked(document: dict[str, Any]) -> Config:
     document = _merged(to_document(Config()), without_numpy(document))
     if isinstance(document.get("drives"), dict):
         drives = with_preset(with_servo_defaults(document["drives"]))
-        document["drives"] = with_microcontroller_defaults(drives)
+        document["drives"] = with_axis_defaults(drives)
     config: Config = converted_value("", document, Config)
     return config
 

@@ -101,7 +101,7 @@ def with_motor_defaults(
 
 def _with_defaults(axis: dict[str, Any], model: ServoModel, *, is_angle: bool) -> dict[str, Any]:
     radian = {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)} if is_angle else {}
-    filled = {"sign": 1, **radian, **axis}
+    filled = {**radian, **axis}
     counts = filled.get("counts_per_unit")
     if not isinstance(counts, int | float) or counts <= 0:
         return filled  # refused when it is checked
@@ -109,6 +109,5 @@ def _with_defaults(axis: dict[str, Any], model: ServoModel, *, is_angle: bool) -
     return {
         "speed_limit": turns * COUNTS_PER_TURN / counts,
         "following_error": _FOLLOWING_ERROR / counts,
-        "following_window": _FOLLOWING_ERROR / 2 / counts,
         **filled,
     }

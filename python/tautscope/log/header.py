@@ -33,20 +33,24 @@ class RunInfo:
 def header_messages(info: RunInfo, stamp: int) -> dict[str, bytes]:
     """The messages at the start of a log: configuration, run, versions, and a camera if used."""
     config = info.config
-    versions = {
+    messages = {
+        topics.CONFIG: {"data": dump_config(config)},
+        topics.RUN: {"data": tomlkit.dumps(run_facts(info.compensated, info.segments))},
+        topics.VERSIONS: {"data": json.dumps(software_versions())},
+    }
+    if not config.dof:
+        messages[topics.CAMERA_INFO] = _camera_info(config.camera, stamp)
+    return topics.encode_all(messages)
+
+
+def software_versions() -> dict[str, str]:
+    """Versions of tautscope, Python and the libraries of a log; the kind of machine."""
+    return {
         "tautscope": __version__,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
         **{name: version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
     }
-    messages = {
-        topics.CONFIG: {"data": dump_config(config)},
-        topics.RUN: {"data": tomlkit.dumps(run_facts(info.compensated, info.segments))},
-        topics.VERSIONS: {"data": json.dumps(versions)},
-    }
-    if not config.dof:
-        messages[topics.CAMERA_INFO] = _camera_info(config.camera, stamp)
-    return topics.encode_all(messages)
 
 
 def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:
