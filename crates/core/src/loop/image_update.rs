@@ -98,7 +98,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let is_missing = self.is_missing(measurement.observable) || I::IS_WHOLE;
+        let is_missing = self.is_missing(measurement.observable);
         let (status, triggers) = self.accept(&past, &measurement, is_missing, raised);
         Outcome {
             status,
