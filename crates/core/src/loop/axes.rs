@@ -161,6 +161,8 @@ pub struct View<const N: usize> {
 impl<P: SensorBlocks<N>, const N: usize> Sight<P, N> for Reading<'_> {
     type View = View<N>;
 
+    const IS_WHOLE: bool = false;
+
     fn is_usable(&self) -> bool {
         let known = |value: &f64| value.is_finite();
         self.values.iter().any(known) && self.values.iter().all(|v| known(v) || v.is_nan())
