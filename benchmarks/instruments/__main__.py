@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
+from instruments.alarms import alarm_table
 from instruments.explanation import explain
 from instruments.properties import markdown_table
 from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
@@ -25,6 +26,7 @@ from tautscope.commands.progress import progress_bar
 MOTIONS = ("hand", "sines")
 INSTRUMENTS = 200
 PAGE = ROOT / "docs" / "instruments.md"
+ALARMS = ROOT / "docs" / "faults.md"
 
 
 def arguments() -> argparse.Namespace:
@@ -99,8 +101,10 @@ def main() -> None:
         facts = {"images": not options.features, "instruments": rows}
         print(json.dumps({"rows": summary_rows(rows), **facts}))
     else:
-        print(f"{seed_table(rows)}\n\n{text}")
+        print(f"{seed_table(rows)}\n\n{text}\n\n{alarm_table(rows)}")
     if options.write:
+        if options.features and (alarms := alarm_table(rows)):
+            insert(ALARMS, "alarms", alarms)
         insert(PAGE, "ranges", markdown_table())
         insert(PAGE, "features" if options.features else "images", text)
 

@@ -65,6 +65,8 @@ class Figures:
         visible: Number of images with both bands visible and apart.
         statuses: Number of these images by the status of their update.
         stopped: Why the run ended early; None if it did not.
+        images: Number of images.
+        flags: Number of images after which each flag was in force.
     """
 
     spread: list[float] = field(default_factory=lambda: [np.nan] * 3)
@@ -73,6 +75,8 @@ class Figures:
     visible: int = 0
     statuses: dict[str, int] = field(default_factory=dict)
     stopped: str | None = None
+    images: int = 0
+    flags: dict[str, int] = field(default_factory=dict)
 
 
 def simulate(run: Run) -> Figures:
@@ -126,7 +130,7 @@ def without_image_effects(config: Config) -> Config:
 
 
 class _Look:
-    """The image update, with images or with their true features and noise; counts statuses."""
+    """The image update, with images or with true features and noise; counts statuses and flags."""
 
     def __init__(self, run: Run, figures: Figures) -> None:
         self._has_images, self._figures = run.images, figures
@@ -144,6 +148,9 @@ class _Look:
             features = truth + NOISE * self._noise.standard_normal(4)
             features[~np.repeat(is_visible, 2)] = np.nan
             report = loop.on_features(features if is_visible.any() else None, frame.captured_at)
+        self._figures.images += 1
+        for flag in loop.supervision.flags:
+            self._figures.flags[flag] = self._figures.flags.get(flag, 0) + 1
         if is_visible.all() and np.hypot(*(truth[2:] - truth[:2])) >= LEAST_SEPARATION:
             self._figures.visible += 1
             status = str(report.status)

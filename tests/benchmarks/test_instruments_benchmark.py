@@ -12,6 +12,7 @@ import pytest
 from common.paths import ROOT
 from common.processes import run_parallel
 from instruments import properties, runs
+from instruments.alarms import alarm_table
 from instruments.explanation import explain
 from instruments.properties import TABLE, draw_instrument, markdown_table
 from instruments.rows import seed_rows, summary_rows, table
@@ -21,6 +22,7 @@ from tautscope.config import Config, load_config
 from tautscope.dof import Dof
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame
+from tautscope.loop.safety import Reaction, Supervision
 from tautscope.report.metrics import loop_width
 from tautscope.twin import Twin
 from tautscope.twin.plant import Plant
@@ -129,6 +131,8 @@ def test_features_are_those_of_the_full_image() -> None:
     seen: list[np.ndarray] = []
 
     class Loop:
+        supervision = Supervision(Reaction.WARN, ("lost",), (), 1.0)
+
         def on_features(self, features: np.ndarray, captured_at: float) -> Any:
             seen.append(features)
             return type("Report", (), {"status": "ok"})
@@ -149,6 +153,19 @@ def test_features_are_those_of_the_full_image() -> None:
     assert np.abs(difference.mean(axis=0)).max() < 0.2
     assert difference.std() == pytest.approx(0.2, rel=0.3)
     assert figures.visible == len(frames[0]) > 10
+    assert figures.flags == {"lost": figures.images} == {"lost": len(frames[0])}
+
+
+def test_alarms_count_instruments_within_a_hundredth_of_the_images() -> None:
+    rows: list[dict[str, Any]] = [
+        {"motion": "hand", "runs": {"best": {"images": 1000, "flags": flags}}}
+        for flags in ({"lost": 10, "late": 1000}, {"lost": 11}, {})
+    ]
+    rows.append({"motion": "sines", "runs": {"best": {"images": 10, "flags": {"frozen": 10}}}})
+    *_, lost, late = alarm_table(rows).splitlines()
+    assert lost == "| lost | 1.0 % | 1.1 % | 2 |"
+    assert late.startswith("| late | 0.0 % |") and late.endswith("| 2 |")
+    assert alarm_table([{"motion": "hand", "runs": {}}]) == ""
 
 
 def figures(spread: float, refused: int = 0, stopped: str | None = None) -> Figures:

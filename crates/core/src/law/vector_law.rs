@@ -8,7 +8,6 @@ use crate::law::settings::LawSettings;
 use crate::model::plays::{
     COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, gain_row, product,
 };
-use crate::model::slack::Slack;
 
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
@@ -24,6 +23,8 @@ const START: f64 = 3.0;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
+/// Distance in units by which limits of the contact offsets move the target from which on they count.
+const HARM: f64 = 0.1;
 /// Largest correction of the target by the model, in units.
 const LARGEST_CORRECTION: f64 = 0.2;
 
@@ -72,6 +73,7 @@ pub struct VectorLaw<const N: usize> {
     travel: [f64; N],
     rows: [Row; N],
     share: f64,
+    is_limited: bool,
 }
 
 /// Bounds of the law for N DOFs.
@@ -129,6 +131,7 @@ impl<const N: usize> VectorLaw<N> {
             travel: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
             share: 1.0,
+            is_limited: false,
         })
     }
 
@@ -146,6 +149,11 @@ impl<const N: usize> VectorLaw<N> {
     pub fn follow(&self, plays: &Plays<N>, command: [f64; N]) -> Plays<N> {
         let to = over(subtract(command, self.origin), self.transmission.unit());
         self.transmission.advance(plays, &to)
+    }
+
+    /// Whether the limits of the contact offsets keep the tip from the reference by more than a tenth of a unit.
+    pub const fn is_limited(&self) -> bool {
+        self.is_limited
     }
 
     /// First reference (N,) [m or rad]; NaN before it.
@@ -173,7 +181,10 @@ impl<const N: usize> VectorLaw<N> {
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
-        self.target = self.next_target(relative);
+        let target = self.next_target(relative);
+        self.target = self.within_limits(target, relative);
+        let taken = subtract(target, self.target);
+        self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let mut command = self.command;
         for group in 0..N {
             let members = self.transmission.friction().members(group);
@@ -289,16 +300,12 @@ impl<const N: usize> VectorLaw<N> {
                     .min(steady + LARGEST_CORRECTION);
             }
         }
-        self.within_limits(target, reference, &slack)
+        target
     }
 
     /// The target with contact offsets within their limits.
-    fn within_limits(
-        &self,
-        mut target: [f64; N],
-        reference: [f64; N],
-        slack: &[Slack; N],
-    ) -> [f64; N] {
+    fn within_limits(&self, mut target: [f64; N], reference: [f64; N]) -> [f64; N] {
+        let slack = self.transmission.slack(&self.rows);
         let dofs = target.iter_mut().zip(reference).zip(slack).zip(self.limits);
         for ((((to, reference), slack), limit), unit) in dofs.zip(self.transmission.unit()) {
             let [minus, plus] = slack.offsets();

@@ -187,13 +187,9 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBloc
         let has_changed = self
             .prediction
             .update(past.time, past.predicted_state, measured);
-        let is_limited = self.slack.iter().zip(self.limits).any(|(slack, limit)| {
-            let [minus, plus] = slack.offsets();
-            limit.exceeds(minus, plus)
-        });
         Updated {
             triggers: self.triggers(past),
-            raised: Flags::when(is_limited, Flag::WidthLimit)
+            raised: Flags::when(self.law.is_limited(), Flag::WidthLimit)
                 .union(Flags::when(has_changed, Flag::SlackChanged))
                 .union(Flags::when(self.is_geometry_off(), Flag::GeometryOff)),
         }

@@ -98,8 +98,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let is_missing = self.is_missing(measurement.observable) || I::IS_WHOLE;
-        let (status, triggers) = self.accept(&past, &measurement, is_missing, raised);
+        let is_missing = self.is_missing(measurement.observable);
+        let is_missed = [is_missing || I::IS_WHOLE, is_missing];
+        let (status, triggers) = self.accept(&past, &measurement, is_missed, raised);
         Outcome {
             status,
             past: Some(past),
@@ -148,12 +149,12 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
 
     /// Updates the estimates from a measurement that has passed the checks.
     ///
-    /// A DOF that it did not determine is worth a flag where `is_missing`: no other sensor does.
+    /// A part that is missing, and a DOF that it did not determine, are worth a flag where missed: no other sensor has them.
     fn accept(
         &mut self,
         past: &Entry<N>,
         measurement: &Measurement<N, P::Evidence>,
-        is_missing: bool,
+        [is_part_missed, is_dof_missed]: [bool; 2],
         raised: &mut Flags,
     ) -> (Status, [Triggers; N]) {
         let status = if measurement.is_partial {
@@ -186,11 +187,11 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             self.monitors.enabled(
                 conspicuous
                     .union(Flags::when(
-                        is_missing && status == Status::Partial,
+                        is_part_missed && status == Status::Partial,
                         Flag::Merged,
                     ))
                     .union(Flags::when(
-                        is_missing && status == Status::Held,
+                        is_dof_missed && status == Status::Held,
                         Flag::Unobservable,
                     )),
             ),

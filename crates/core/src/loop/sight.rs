@@ -9,7 +9,7 @@ pub(crate) trait Sight<P: ProfileBlocks<N>, const N: usize> {
     /// What a report says of it.
     type View: Copy;
 
-    /// Whether each measurement is to determine every DOF; else several sensors may share the DOFs.
+    /// Whether each measurement is to be complete; else several sensors may share the DOFs.
     const IS_WHOLE: bool = true;
 
     /// Whether anything was seen.

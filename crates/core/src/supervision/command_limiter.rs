@@ -293,8 +293,7 @@ impl<const N: usize> CommonBound<N> {
     fn bring_back(&self, commands: &mut [f64; N]) -> bool {
         let step = self.step(*commands);
         let bound = square(self.gain) * dot(self.motion, self.motion);
-        let exceeds = dot(step, step) > bound * square(1.0 + ROUNDING) + square(SUM_ROUNDING);
-        if !exceeds {
+        if dot(step, step) <= square(self.reach) {
             return false;
         }
         // Between no motion and the command, as near to the motion of the reference as may be.

@@ -392,6 +392,26 @@ fn a_gain_of_one_leaves_the_motion_of_the_reference() {
     assert_eq!(results, [LimiterResult::Violation; 3]);
 }
 
+/// Positions that are rounded move by the bound and a few parts in 10^16 of a unit: for a motion of a nanometre, more than
+/// any share of it.
+#[test]
+fn a_slow_motion_at_the_bound_is_lawful_in_spite_of_rounding() {
+    let mut limiters = limiters([0, 0, 0], 1.0);
+    let [unit, side, _] = units::<3>();
+    limiters.limit([unit, side, 0.0], [unit, side, 0.0]);
+    let to = unit + 1e-7 * unit;
+    let (command, results) = limiters.limit([to, side, 0.0], [to, side + 1e-11 * side, 0.0]);
+    assert_eq!(results, [LimiterResult::Unchanged; 3], "{command:?}");
+    let farther = unit + (2e-7 + 1e-15) * unit;
+    let (_, results) = limiters.limit([unit + 2e-7 * unit, side, 0.0], [farther, side, 0.0]);
+    assert_eq!(results, [LimiterResult::Unchanged; 3]);
+    let (_, results) = limiters.limit(
+        [unit + 3e-7 * unit, side, 0.0],
+        [farther + 2e-7 * unit, side, 0.0],
+    );
+    assert_eq!(results, [LimiterResult::Violation; 3]);
+}
+
 #[test]
 fn a_friction_is_checked() {
     let error = |group, lever| Friction::new(group, lever).unwrap_err();
