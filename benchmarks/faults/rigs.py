@@ -13,7 +13,7 @@ from faults.recorder import QUICK_STOP, Floats, RunRecorder
 from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config
 from tautscope.hardware.following_error import FollowingErrorMonitor
-from tautscope.hardware.rig import require_drives
+from tautscope.hardware.motor_rig import require_drives
 from tautscope.loop.rig import Sample
 from tautscope.loop.safety import Reaction
 from tautscope.twin import Twin
