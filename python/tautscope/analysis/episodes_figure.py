@@ -27,8 +27,10 @@ def episodes_figure(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> Fig
             axes.plot(at, width, "o", color=BLUE, markersize=2.5)
             if known:
                 axes.axhline(float(np.median(width)), color=GREY, linewidth=0.8, zorder=0)
+            axes.margins(y=0.15)
             axes.set_ylim(bottom=0)
             axes.set_ylabel("slack")
-            axes.set_title(f"{name}: identified in {len(known)} of {len(own)} episodes")
+            median = f", median {np.median(width):.3g}" if known else ""
+            axes.set_title(f"{name}: identified in {len(known)} of {len(own)} episodes{median}")
         panels[-1].set_xlabel("episode")
     return figure
