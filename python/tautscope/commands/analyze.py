@@ -104,8 +104,8 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.analysis.output import write_results  # noqa: PLC0415
     from tautscope.runs.columns import list_columns  # noqa: PLC0415
 
-    episodes, sheet = _open(options)
     if options.command is None and options.measured is None:
+        _, sheet = _open(options)
         columns, pairs = list_columns(sheet)
         print_columns(options.file, columns, pairs, is_json=options.json)
         return 0
@@ -117,6 +117,7 @@ def _run(options: argparse.Namespace) -> int:
             f"--command has {len(options.command)} columns, --measured {len(options.measured)}: "
             "one tip per actuator"
         )
+    episodes, sheet = _open(options)
     if episodes and options.episode is None:
         names = _names([sheet.titles[sheet.index(tip)] for tip in options.measured])
         analyze_episodes.analyze_episodes(options, episodes, names)
