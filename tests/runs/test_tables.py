@@ -219,3 +219,18 @@ def test_numbers_whose_squares_overflow_are_refused(ending: str, tmp_path: Path)
     with pytest.raises(RecordError, match=r"[23], column tip_x: got .*1e\+?308.*up to 1e\+100"):
         read_table(file, ["tip_x"])
     assert np.isnan(read_table(file, ["tip_z"]).columns["tip_z"]).tolist() == [False, True, False]
+
+
+def test_a_panic_of_the_parquet_reader_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some damaged files make Polars panic, which is no `Exception`."""
+
+    def panic(*_: object) -> None:
+        raise pl.exceptions.PanicException("range.end as u64 <= self.size")
+
+    file = tmp_path / "log.parquet"
+    pl.DataFrame({"a": [1.0, 2.0]}).write_parquet(file)
+    monkeypatch.setattr(pl, "read_parquet", panic)
+    with pytest.raises(RecordError, match=r"log\.parquet: got 'range.end.*a Parquet file"):
+        open_table(file)

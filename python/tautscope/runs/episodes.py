@@ -60,7 +60,10 @@ def list_episodes(folder: str | PathLike[str]) -> list[Episode]:
         try:
             numbers = pl.read_parquet(file, columns=[EPISODE])[EPISODE].unique().to_list()
             found += [Episode(int(number), file) for number in numbers]
-        except Exception as error:  # of any kind, for a damaged file
+        except (
+            Exception,
+            pl.exceptions.PanicException,
+        ) as error:  # of any kind, for a damaged file
             raise _damaged(file, error) from None
     if not found:
         raise RecordError(f"{folder}/data", "no episode", "chunk-000/episode_000000.parquet, ...")
@@ -80,7 +83,7 @@ def open_episode(folder: str | PathLike[str], episode: Episode) -> Sheet:
         rows = pl.scan_parquet(episode.file).filter(pl.col(EPISODE) == episode.number)
         used = [name for name, kind in rows.collect_schema().items() if _is_numeric(kind)]
         frame = with_single_numbers(rows.select(used).collect(), names)
-    except Exception as error:  # of any kind, for a damaged file
+    except (Exception, pl.exceptions.PanicException) as error:  # of any kind, for a damaged file
         raise _damaged(episode.file, error) from None
     file = f"{folder}, episode {episode.number}"
     lines = np.arange(1, len(frame) + 1)
@@ -110,7 +113,7 @@ def _flat(names: Any) -> list[str]:
     return [str(each) for each in names or ()]
 
 
-def _damaged(file: Path, error: Exception) -> RecordError:
+def _damaged(file: Path, error: BaseException) -> RecordError:
     with file.open("rb") as stream:
         is_pointer = stream.read(40).startswith(b"version https://git-lfs")
     what = next(iter(str(error).splitlines()), "") or type(error).__name__

@@ -206,7 +206,7 @@ def _open(path: str | PathLike[str], what: str) -> Sheet:
                 infer_schema=False,
                 truncate_ragged_lines=True,
             )
-    except pl.exceptions.PolarsError as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         kind = "a Parquet file" if is_parquet else "a CSV file with a header line"
         raise RecordError(file, str(error).splitlines()[0], kind) from None
     if text is None:
