@@ -11,6 +11,7 @@ from tautscope.analysis.compensation import as_played, plant, run
 from tautscope.analysis.compensator import compensator
 from tautscope.analysis.slide import slide
 from tautscope.analysis.verdict import Verdict, judge
+from tautscope.errors import RecordError
 from tautscope.runs.records import Cleaning, Record, read_record
 
 
@@ -73,3 +74,19 @@ def test_the_size_of_the_numbers_does_not_matter(unit: str, size: float) -> None
     assert scaled is not None
     assert scaled.before == pytest.approx(size * plain.before, rel=1e-3)
     assert scaled.after == pytest.approx(size * plain.after, rel=0.05)
+
+
+def test_a_tip_that_is_the_command_is_explained_by_a_gain() -> None:
+    """Without noise the errors are rounding, of either sign."""
+    for count in range(100, 130):
+        command = np.round(6 + 6 * np.sin(np.arange(count) / 5), 2)
+        record = Record(command, command / 2, None, np.arange(count), Cleaning())
+        assert "What explains the record best is a gain alone" in judge(record).text
+
+
+@pytest.mark.parametrize("tips", [0, 1])
+def test_a_record_without_tips_is_refused(tips: int) -> None:
+    command = np.sin(np.arange(200.0))
+    measured = np.where(np.arange(200) < tips, command, np.nan)
+    with pytest.raises(RecordError, match=f"measured: got '{tips} tips"):
+        judge(Record(command, measured, None, np.arange(200), Cleaning()))

@@ -221,6 +221,16 @@ def test_numbers_whose_squares_overflow_are_refused(ending: str, tmp_path: Path)
     assert np.isnan(read_table(file, ["tip_z"]).columns["tip_z"]).tolist() == [False, True, False]
 
 
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_numbers_too_small_to_divide_by_are_zero(ending: str, tmp_path: Path) -> None:
+    file = tmp_path / f"log.{ending}"
+    frame = pl.DataFrame({"time": [1e-308, 2e-308], "motor": [1e-90, -2.0]})
+    getattr(frame, f"write_{ending}")(file)
+    sheet = open_table(file)
+    np.testing.assert_array_equal(sheet.values(0, "time"), [0.0, 0.0])
+    np.testing.assert_array_equal(sheet.values(1, "motor"), [1e-90, -2.0])
+
+
 def test_a_panic_of_the_parquet_reader_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

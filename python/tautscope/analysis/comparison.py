@@ -202,9 +202,12 @@ def check_motion(record: Record) -> int:
     """First sample of the second half; both halves have equally many measured tips.
 
     Raises:
-        RecordError: Command or tip does not move in the first half.
+        RecordError: There are fewer than two measured tips, or command or tip does not move in the
+            first half.
     """
     with_tip = np.flatnonzero(np.isfinite(record.measured))
+    if len(with_tip) < 2:
+        raise RecordError("measured", f"{len(with_tip)} tips beside commands", "at least 2")
     half = int(with_tip[len(with_tip) // 2])
     first = with_tip[with_tip < half]
     for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):

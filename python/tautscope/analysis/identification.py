@@ -256,7 +256,7 @@ def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]
     total = np.sum(tips**2, axis=1)
     explained = gains.max(axis=0) / np.maximum(total, 1e-300)
     p_value = (1 + int(np.sum(explained[1:] >= explained[0]))) / (SURROGATES + 1)
-    return total[0] - gains[:, 0], p_value
+    return np.maximum(total[0] - gains[:, 0], 0.0), p_value  # rounding, where it is exact
 
 
 def _stroke_ends(signals: Signals, shape: Shape) -> NDArray[np.intp]:

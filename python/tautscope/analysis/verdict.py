@@ -27,6 +27,8 @@ from tautscope.runs.records import Record
 
 PARSIMONY = 1.05
 """A simpler explanation is as good if it leaves this factor of the error at most."""
+ROUNDING = 1e-6
+"""Smaller errors, over the extent of the tip, are those of the fit: the record is exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,7 @@ class Verdict:
 
     def _explanation(self) -> str:
         errors = self.found.explanations
-        least = min(errors.values())
+        least = max(min(errors.values()), ROUNDING * float(np.ptp(self.found.predicted)))
         best = next(name for name, error in errors.items() if error <= PARSIMONY * least)
         others = [f"{name} {self._number(errors[name])}" for name in errors if name != best]
         return (

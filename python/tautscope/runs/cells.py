@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 LARGEST = 1e100
-"""Largest number: the sum of the squares of larger ones may overflow."""
+"""Largest number: the sum of the squares of larger ones may overflow. Its inverse is 0."""
 _ALLOWED = f"a number up to {LARGEST:g}, or blank or NaN for none"
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
 _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
@@ -27,29 +27,26 @@ def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np
     """A column as numbers; times become seconds since the first one."""
     import polars as pl  # noqa: PLC0415
 
+    if series.dtype.is_temporal():
+        return _seconds(series)
     if series.dtype == pl.String:
         text = series.str.strip_chars().str.strip_chars('"').str.strip_chars()
         values = _with_decimal_point(text).cast(pl.Float64, strict=False)
         is_bad = values.is_null() & ~text.str.to_lowercase().is_in(NO_VALUE).fill_null(True)
         if is_bad.any() and not values.is_finite().any() and (times := _times(text)) is not None:
             return _seconds(times)
-        is_bad = is_bad | _is_too_large(values)
-        if is_bad.any():
-            index = int(is_bad.arg_max() or 0)
-            where = f"{file}, {line} {rows[index]}, column {name}"
-            raise RecordError(where, text[index], _ALLOWED)
-        return values.fill_null(float("nan")).to_numpy().astype(np.float64)
-    if series.dtype.is_temporal():
-        return _seconds(series)
-    if not (series.dtype.is_numeric() or series.dtype == pl.Boolean):
+    elif series.dtype.is_numeric() or series.dtype == pl.Boolean:
+        text, values = series, series.cast(pl.Float64)
+        is_bad = pl.repeat(False, len(values), eager=True)
+    else:
         raise RecordError(f"{file}, column {name}", str(series.dtype), "numbers")
-    values = series.cast(pl.Float64)
-    is_bad = _is_too_large(values)
+    is_bad = is_bad | _is_too_large(values)
     if is_bad.any():
         index = int(is_bad.arg_max() or 0)
         where = f"{file}, {line} {rows[index]}, column {name}"
-        raise RecordError(where, values[index], _ALLOWED)
-    return values.fill_null(float("nan")).to_numpy().astype(np.float64)
+        raise RecordError(where, text[index], _ALLOWED)
+    found = values.fill_null(float("nan")).to_numpy().astype(np.float64)
+    return np.where(np.abs(found) < 1 / LARGEST, 0.0, found)
 
 
 def _is_too_large(values: pl.Series) -> pl.Series:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import RecordError
-from tautscope.runs.axes import find_axes, title_of
+from tautscope.runs.pose_columns import find_axes, title_of
 from tautscope.runs.tables import Sheet, filled
 from tautscope.runs.units import TIMES, split_unit
 
@@ -121,13 +121,9 @@ def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
 
 
 def _unit(values: Floats) -> Floats:
-    """Deviations from the mean, of length 1; 0 if there are none. Of numbers of any size."""
+    """Deviations from the mean, of length 1; 0 if there are none."""
     centred = np.asarray(values - values.mean())
-    size = float(np.max(np.abs(centred)))
-    if size == 0:
-        return centred
-    centred = centred / size
-    return np.asarray(centred / np.linalg.norm(centred))
+    return centred / (float(np.linalg.norm(centred)) or 1.0)
 
 
 def _ordered(one: str, other: str, values: dict[str, Floats]) -> tuple[str, str]:

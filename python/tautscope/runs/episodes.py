@@ -60,10 +60,7 @@ def list_episodes(folder: str | PathLike[str]) -> list[Episode]:
         try:
             numbers = pl.read_parquet(file, columns=[EPISODE])[EPISODE].unique().to_list()
             found += [Episode(int(number), file) for number in numbers]
-        except (
-            Exception,
-            pl.exceptions.PanicException,
-        ) as error:  # of any kind, for a damaged file
+        except (Exception, pl.exceptions.PanicException) as error:  # any, of a damaged file
             raise _damaged(file, error) from None
     if not found:
         raise RecordError(f"{folder}/data", "no episode", "chunk-000/episode_000000.parquet, ...")
@@ -83,7 +80,7 @@ def open_episode(folder: str | PathLike[str], episode: Episode) -> Sheet:
         rows = pl.scan_parquet(episode.file).filter(pl.col(EPISODE) == episode.number)
         used = [name for name, kind in rows.collect_schema().items() if _is_numeric(kind)]
         frame = with_single_numbers(rows.select(used).collect(), names)
-    except (Exception, pl.exceptions.PanicException) as error:  # of any kind, for a damaged file
+    except (Exception, pl.exceptions.PanicException) as error:  # any, of a damaged file
         raise _damaged(episode.file, error) from None
     file = f"{folder}, episode {episode.number}"
     lines = np.arange(1, len(frame) + 1)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tautscope.errors import MissingExtraError, MissingPathError, RecordError
 from tautscope.runs import bags
 from tautscope.runs.array_files import read_arrays, with_single_numbers
-from tautscope.runs.axes import find_axes, title_of, travel, turn
 from tautscope.runs.cells import numbers
+from tautscope.runs.pose_columns import find_axes, title_of, travel, turn
 from tautscope.runs.table_text import split_table
 from tautscope.runs.units import check_unit, split_unit
 
@@ -130,7 +130,7 @@ def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "rec
     column with several numbers in each row they are ``tip.1``, ``tip.2``, ...
     Those of a bag are as in `tautscope.runs.bags.read_bag`. Of quaternions (``tip_qx`` to
     ``tip_qw``) and points (``tip_x`` to ``tip_z``) there are also ``tip_q_turn`` and
-    ``tip_travel``, see `tautscope.runs.axes`.
+    ``tip_travel``, see `tautscope.runs.pose_columns`.
 
     Args:
         path: The file; ``-`` is standard input.

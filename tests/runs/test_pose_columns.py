@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 from scipy.spatial.transform import Rotation
-from tautscope.runs.axes import find_axes, travel, turn
 from tautscope.runs.columns import list_columns
+from tautscope.runs.pose_columns import find_axes, travel, turn
 from tautscope.runs.tables import open_table, read_table
 
 RNG = np.random.default_rng(2)
@@ -78,6 +78,6 @@ def test_tables_with_poses_have_turn_and_travel(ending: str, tmp_path: Path) -> 
 
 def test_pairs_are_proposed_for_numbers_of_any_size(tmp_path: Path) -> None:
     time = np.linspace(0, 20, 100)
-    frame = pl.DataFrame({"a": 1e-300 * np.sin(time), "b": 1e90 * np.sin(time - 0.2)})
+    frame = pl.DataFrame({"a": 1e-99 * np.sin(time), "b": 1e99 * np.sin(time - 0.2)})
     frame.write_csv(tmp_path / "record.csv")
     assert list_columns(open_table(tmp_path / "record.csv"))[1] == [("a", "b")]
