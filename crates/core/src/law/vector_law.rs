@@ -8,6 +8,7 @@ use crate::law::settings::LawSettings;
 use crate::model::plays::{
     COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, gain_row, product,
 };
+use crate::model::slack::Slack;
 
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
@@ -181,8 +182,9 @@ impl<const N: usize> VectorLaw<N> {
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
-        let target = self.next_target(relative);
-        self.target = self.within_limits(target, relative);
+        let slack = self.transmission.slack(&self.rows);
+        let target = self.next_target(relative, &slack);
+        self.target = self.within_limits(target, relative, &slack);
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let mut command = self.command;
@@ -267,12 +269,11 @@ impl<const N: usize> VectorLaw<N> {
     }
 
     /// The target for a reference (N,) in units.
-    fn next_target(&self, reference: [f64; N]) -> [f64; N] {
+    fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
         let direction = self.direction.value();
         let deflection = self.transmission.deflection(&self.rows, &direction);
-        let slack = self.transmission.slack(&self.rows);
         let mut steady = self.target;
-        let dofs = steady.iter_mut().zip(&self.rows).zip(&slack);
+        let dofs = steady.iter_mut().zip(&self.rows).zip(slack);
         let given = reference.into_iter().zip(deflection).zip(direction);
         for (((to, row), slack), ((reference, deflection), direction)) in dofs.zip(given) {
             let linear: f64 = row.iter().take(SHARED + OWN).sum();
@@ -292,7 +293,7 @@ impl<const N: usize> VectorLaw<N> {
                 .iter_mut()
                 .zip(steady)
                 .zip(reference.into_iter().zip(tip))
-                .zip(&slack);
+                .zip(slack);
             for (((to, steady), (reference, tip)), slack) in dofs {
                 *to += (reference - tip) / slack.gain;
                 *to = to
@@ -304,8 +305,12 @@ impl<const N: usize> VectorLaw<N> {
     }
 
     /// The target with contact offsets within their limits.
-    fn within_limits(&self, mut target: [f64; N], reference: [f64; N]) -> [f64; N] {
-        let slack = self.transmission.slack(&self.rows);
+    fn within_limits(
+        &self,
+        mut target: [f64; N],
+        reference: [f64; N],
+        slack: &[Slack; N],
+    ) -> [f64; N] {
         let dofs = target.iter_mut().zip(reference).zip(slack).zip(self.limits);
         for ((((to, reference), slack), limit), unit) in dofs.zip(self.transmission.unit()) {
             let [minus, plus] = slack.offsets();
