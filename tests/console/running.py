@@ -119,7 +119,7 @@ def running_console(
     ):
         patch.setattr(lease, "COMMAND_AGE", AGE)
         patch.setattr(operator_input, "COMMAND_TIMEOUT", TIMEOUT)
-        patch.setattr(operator_input, "PROGRAM_TIMEOUT", TIMEOUT)
+        patch.setattr(operator_input, "IDLE_TIMEOUT", TIMEOUT)
         control = RigControl(config, rig or LiveTwin(config), folder, executor)
         session = Session(control, channels, ending.is_set)
         thread = threading.Thread(target=session.main, name="control")

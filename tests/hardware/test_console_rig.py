@@ -36,7 +36,7 @@ class Desk:
         """Enable the rig while the page does something; a busy computer may take its time."""
         self.control.while_opening = meanwhile
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("tautscope.console.operator_input.COMMAND_TIMEOUT", patience)
+            patch.setattr("tautscope.console.operator_input.IDLE_TIMEOUT", patience)
             self.be_present()
             self.control.open()
 

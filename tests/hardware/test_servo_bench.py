@@ -133,7 +133,8 @@ def test_doctor_jog_and_a_fault_by_name(
 def test_the_console_enables_and_stops_motors(
     protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tautscope.console.operator_input.COMMAND_TIMEOUT", TIMEOUT)
+    for name in ("COMMAND_TIMEOUT", "IDLE_TIMEOUT"):
+        monkeypatch.setattr(f"tautscope.console.operator_input.{name}", TIMEOUT)
     config = bench_config(protocol, tmp_path)
     with running_bench(config, tmp_path) as (_, _, lines), ThreadPoolExecutor(1) as executor:
         control = RigControl(config, HardwareRig(config), tmp_path / "console", executor)

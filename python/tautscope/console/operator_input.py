@@ -20,9 +20,10 @@ from tautscope.console.programs import Program
 
 Floats = NDArray[np.float64]
 COMMAND_TIMEOUT = 0.1
-"""Time without an accepted command after which motion stops [s]."""
-PROGRAM_TIMEOUT = 0.5
-"""The same for a program, which nobody holds: a page may be busy for a moment, not gone [s]."""
+"""Time without an accepted command after which motion by hand stops [s]."""
+IDLE_TIMEOUT = 0.5
+"""The same while no hand moves anything, at rest and in a program [s]. A page may be busy for a
+moment: browsers hold its timers back for about 0.1 s when a touch begins."""
 LARGEST_SPEED = 0.75
 """Speed at full deflection and scale 1 [of the largest speed that the loop follows]."""
 DEAD_BAND = 0.2
@@ -37,7 +38,7 @@ class OperatorInput:
     At each tick v is the commanded speed, ramped up from rest, and u <- u + v dt. The reference
     rests, and moves again only after the operator has let go of the input device once, when
 
-    - no command was accepted for `COMMAND_TIMEOUT`,
+    - no command was accepted for `COMMAND_TIMEOUT`, or at rest for `IDLE_TIMEOUT`,
     - the lease changes,
     - motion is stopped (`stop`) or held by the supervisor.
 
@@ -95,7 +96,8 @@ class OperatorInput:
 
     @property
     def _timeout(self) -> float:
-        return COMMAND_TIMEOUT if self.program is None else PROGRAM_TIMEOUT
+        by_hand = self.program is None and (self._axes.any() or self._velocity.any())
+        return COMMAND_TIMEOUT if by_hand else IDLE_TIMEOUT
 
     def receive(self, received: Received, now: float) -> None:
         """Take a deflection of the input device, unless the lease refuses it."""
