@@ -12,6 +12,19 @@ from tautscope.loop.references import SineSequence
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
 
+REAL_TIME = ("console", "hardware", "ros2")
+"""Folders of tests with processes, buses and browsers in real time."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give tests in real time a second try: a busy computer may miss a deadline that they need.
+
+    The summary lists the first failure as RERUN.
+    """
+    for item in items:
+        if item.path.parent.name in REAL_TIME:
+            item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=2))
+
 
 def shared_data(*parts: str) -> Path:
     """A path in the shared data: TAUTSCOPE_DATA, or ../shared/data beside the repository.

@@ -198,6 +198,14 @@ def test_ids_are_set_as_the_documentation_says(tmp_path: Path) -> None:
             assert servos.servos[0].stored[7 if protocol == "dynamixel" else 5] == 17
 
 
+def test_bytes_at_another_bit_rate_are_noise(dxl: Line) -> None:
+    _, port, packets = dxl
+    assert port.setBaudRate(57_600)
+    assert packets.ping(port, 2)[1] == dynamixel.COMM_RX_TIMEOUT
+    assert port.setBaudRate(1_000_000)
+    assert packets.ping(port, 2)[1] == OK
+
+
 def test_crc_is_that_of_the_manual() -> None:
     """The ping of the manual's page on protocol 2.0: FF FF FD 00 01 03 00 01 19 4E."""
     assert crc16(bytes.fromhex("FFFFFD0001030001")) == 0x4E19

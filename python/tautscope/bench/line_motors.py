@@ -12,6 +12,7 @@ import itertools
 import math
 import os
 import select
+import struct
 import time
 import tty
 from abc import abstractmethod
@@ -26,6 +27,9 @@ from tautscope.errors import ConfigError
 
 _IDLE = 0.005
 """How often the line is looked at while no client has it open [s]."""
+
+_TCGETS2 = 0x802C542A
+"""ioctl(2): settings of a terminal with any bit rate (struct termios2), which `termios` lacks."""
 
 
 class LineMotors(SimulatedMotors[Kind]):
@@ -130,9 +134,16 @@ class LineMotors(SimulatedMotors[Kind]):
             return
         try:
             self._buffer += os.read(self._line, 4096)
+            if self._rate() != self._config.bitrate:  # noise to the motors
+                self._buffer.clear()
         except OSError:  # no client has the other end open
             self._buffer.clear()
             time.sleep(_IDLE)
+
+    def _rate(self) -> int:
+        """The bit rate that the client has set [bit/s]."""
+        settings = fcntl.ioctl(self._line, _TCGETS2, bytes(44))
+        return int(struct.unpack("4IB19s2I", settings)[-1])
 
     def _send(self, data: bytes) -> None:
         try:
