@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from axes import colonoscope
-from axes.tracking import PLANTS, Job, simulate, times
+from axes.tracking import PLANTS, Job, bound, simulate, times
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
@@ -37,6 +37,8 @@ def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
         for plant in PLANTS:
             own = [found[job] for job in found if job[:2] == (count, plant)]
             each = np.concatenate(own)
+            exact = [one for job in found if job[:2] == (count, plant) for one in bound(job)]
+            is_ideal = plant == "ideal"
             rows.append(
                 {
                     "dofs": count,
@@ -44,6 +46,8 @@ def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
                     "median": float(np.median(each)),
                     "worst": float(each.min()),
                     "share_below_goal": float(np.mean(each < GOAL)),
+                    "bound": float(np.median(exact)) if is_ideal else None,
+                    "bound_worst": min(exact) if is_ideal else None,
                     "tick": spent[0],
                     "update": spent[1],
                     "seeds": len(own),
@@ -67,15 +71,21 @@ def colonoscope_table(found: dict[colonoscope.Job, list[float]]) -> str:
     return "\n".join(lines)
 
 
+def bounds(row: dict[str, Any]) -> str:
+    """What a law with exact knowledge reaches: median and worst."""
+    return "" if row["bound"] is None else f"{row['bound']:.0%}, {row['bound_worst']:.0%}"
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """A Markdown table of the rows."""
     lines = [
-        "| degrees of freedom | plays | reduction | worst | below 85 % | tick | update |",
-        "|--:|---|--:|--:|--:|--:|--:|",
+        "| degrees of freedom | plays | reduction | worst | below 85 % | bound, worst "
+        "| tick | update |",
+        "|--:|---|--:|--:|--:|--:|--:|--:|",
     ]
     lines += [
         f"| {row['dofs']} | {row['plant']} | {row['median']:.0%} | {row['worst']:.0%} "
-        f"| {row['share_below_goal']:.0%} | {1e6 * row['tick']:.0f} us "
+        f"| {row['share_below_goal']:.0%} | {bounds(row)} | {1e6 * row['tick']:.0f} us "
         f"| {1e6 * row['update']:.0f} us |"
         for row in rows
     ]

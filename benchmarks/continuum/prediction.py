@@ -100,13 +100,14 @@ def settings(share: float) -> Config:
     """The loop's configuration, with a share of the slack and all else alike."""
     # Lengths and travels of the filter are in units of the slack.
     default = EstimationConfig()
-    estimation = EstimationConfig(
-        outlier_distance=NO_OUTLIERS,
-        offset_deviation=OFFSET_DEVIATION / share,
-        tip_deviation=default.tip_deviation / share,
-        weight_travel=default.weight_travel / share,
-        offset_travel=default.offset_travel / share,
-    )
+    lengths = {
+        "offset_deviation": OFFSET_DEVIATION / share,
+        "tip_deviation": default.tip_deviation / share,
+        "weight_travel": default.weight_travel / share,
+        "offset_travel": default.offset_travel / share,
+    }
+    estimation = EstimationConfig(outlier_distance=NO_OUTLIERS, **lengths)
+    unusual = ("estimation.outlier_distance", *(f"estimation.{name}" for name in lengths))
     dofs = tuple(
         DofEntry(
             name=f"bend_{axis}_{segment}",
@@ -121,7 +122,9 @@ def settings(share: float) -> Config:
     return Config(
         dof=dofs,
         estimation=estimation,
-        safety=SafetyConfig(frame_age=1.5, frame_gap=1.5, innovation_limit=NO_OUTLIERS),
+        safety=SafetyConfig(
+            frame_age=1.5, frame_gap=1.5, innovation_limit=NO_OUTLIERS, unusual=unusual
+        ),
     )
 
 

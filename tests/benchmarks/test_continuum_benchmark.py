@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from continuum.__main__ import out_and_back, rms, split, static_model, table, to_rows
-from continuum.prediction import MODELS, predict, products, recursive_least_squares
+from continuum.prediction import (
+    MODELS,
+    OFFSET_DEVIATION,
+    WITHOUT,
+    predict,
+    products,
+    recursive_least_squares,
+    settings,
+)
 from continuum.robot import (
     FILE,
     PRIOR,
@@ -33,6 +41,11 @@ def drawn(rows: int, seed: int = 3) -> Record:
     servos = 3.0 * np.sin(times * np.linspace(0.05, 0.2, 9) + phases) - 1.0
     tip = robot.tip(servos) + rng.normal(0, 1e-4, (rows, 3))
     return Record(servos, tip + robot.place)
+
+
+@pytest.mark.parametrize("share", [1.0, WITHOUT])
+def test_settings_are_accepted(share: float) -> None:
+    assert settings(share).estimation.offset_deviation * share == pytest.approx(OFFSET_DEVIATION)
 
 
 def test_tips_of_many_states_are_those_of_the_package() -> None:

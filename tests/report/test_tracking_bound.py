@@ -8,7 +8,7 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
 from tautscope.loop.references import OperatorMotion
-from tautscope.report.tracking_bound import track_ideal_plays, tracking_bound
+from tautscope.report.tracking_bound import play_bound, track_ideal_plays, tracking_bound
 
 CONFIG = Config()
 HALF = np.array([5e-3, 0.9, 0.55])  # of the article's Table 1
@@ -53,6 +53,15 @@ def test_reduction_of_a_triangle_is_that_of_the_closed_form(dof: Dof) -> None:
     found = tracking_bound(alone(dof, signal), CONFIG, first=20_000)
     assert found[dof] == pytest.approx(expected, abs=2e-3)
     assert np.isnan(np.delete(found, dof)).all()
+
+
+def test_reduction_of_a_play_by_itself_is_that_of_the_closed_form() -> None:
+    """The triangle above, in units in which the travel that forgets a direction is nothing."""
+    h = 50.0
+    phase = np.arange(0, 4, 1e-4) % 1
+    signal = 4 * h * (np.abs(2 * phase - 1) - 0.5)
+    expected = 1 - np.sqrt(2 / 3 * (2 * h / 5) ** 3 / (h**2 * (4 * h - 4 / 3 * h)))
+    assert play_bound(signal, h, first=20_000) == pytest.approx(expected, abs=2e-3)
 
 
 @pytest.mark.parametrize("dof", Dof)

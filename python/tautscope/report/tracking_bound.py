@@ -57,6 +57,22 @@ def tracking_bound(reference: ArrayLike, config: Config, *, first: int = 0) -> F
     return np.array([reduction(*pair) for pair in zip(before, after, strict=True)])
 
 
+def play_bound(reference: ArrayLike, half_width: float, *, first: int = 0) -> float:
+    """`tracking_bound` of a DOF by itself.
+
+    Args:
+        reference: u (n,) [m or rad], one row per control tick.
+        half_width: Of the play [m or rad].
+        first: First row that counts.
+
+    Returns:
+        1 - RMS error with the law / RMS error with the reference as command.
+    """
+    u = np.asarray(reference, dtype=np.float64)
+    free, tip = (_track_one(u, half_width, compensate)[1] for compensate in (False, True))
+    return reduction(*(tracking_rms(u[first:], each[first:]) for each in (free, tip)))
+
+
 def track_ideal_plays(
     reference: ArrayLike, config: Config, *, compensate: bool = True
 ) -> tuple[Floats, Floats]:
@@ -90,13 +106,16 @@ def track_ideal_plays(
         raise SignalError("reference", u.shape, "an array of shape (n, 3)")
     h1, h2, h3 = (0.5 * ARTICLE["uncompensated"][dof] for dof in Dof)
     shaft = _track(u[:, :2], (h1, h2), config.instrument.diameter / 2, compensate)
-    # A second axis that never moves makes bending a case of the vector play.
-    padded = np.column_stack([u[:, 2], np.zeros(len(u))])
-    bending = _track(padded, (h3, 1.0), 1.0, compensate)
-    command, tip = (
-        np.column_stack([first, second[:, 0]]) for first, second in zip(shaft, bending, strict=True)
-    )
+    bending = _track_one(u[:, 2], h3, compensate)
+    command, tip = (np.column_stack(both) for both in zip(shaft, bending, strict=True))
     return command, tip
+
+
+def _track_one(reference: Floats, half: float, compensate: bool) -> tuple[Floats, Floats]:
+    """Command (n,) and tip (n,) of a vector play whose second axis never moves."""
+    padded = np.column_stack([reference, np.zeros(len(reference))])
+    command, tip = _track(padded, (half, 1.0), 1.0, compensate)
+    return command[:, 0], tip[:, 0]
 
 
 def _track(reference: Floats, half: Pair, radius: float, compensate: bool) -> tuple[Floats, Floats]:
