@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import time
+import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -23,8 +24,8 @@ BASELINE_FAILED = 4
 KEPT = ROOT / "target" / "guarantees"
 CONFIG = ROOT / ".cargo" / "mutants.toml"
 LIST = ("cargo", "mutants", "-p", "tautscope-core")
-EQUIVALENT = re.compile(r"^- `(?P<mutant>crates/.+?)`,\s+`(?P<line>.+?)`:", re.MULTILINE)
-"""Mutants that docs/mutants.md explains, and the line that each changes, wherever it is."""
+EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
+"""Mutants that no test can distinguish from the original, the line that each changes, and why."""
 
 
 def mutants(minutes: float) -> Measurement:
@@ -53,8 +54,8 @@ def mutants(minutes: float) -> Measurement:
 
 def summarise(everyone: list[str], now: dict[str, str], earlier: dict[str, str]) -> Measurement:
     """Count the results of this state, or else of an earlier one."""
-    page = (ROOT / "docs" / "mutants.md").read_text(encoding="utf-8")
-    reasons = {(found["mutant"], found["line"]) for found in EQUIVALENT.finditer(page)}
+    explained = tomllib.loads(EQUIVALENT.read_text("utf-8"))["mutant"]
+    reasons = {(each["name"], each["line"]) for each in explained}
     both = earlier | now
     known = {name: both[name] for name in everyone if name in both}
     survived = [name for name, kind in known.items() if kind == "missed"]
