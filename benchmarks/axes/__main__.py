@@ -1,7 +1,7 @@
 """Tracking of an operator's motion by loops of 1 to 8 degrees of freedom, and their computing time.
 
 The plants are plays of this folder, independent of the package; the tip is measured as it is, 40
-times per second, 50 ms late. `--write` updates docs/robots.md.
+times per second, 50 ms late. `--write` updates docs/plants.md.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def main() -> None:
     parser.add_argument("--dofs", type=int, choices=COUNTS, help="only this number [all]")
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="update docs/robots.md")
+    parser.add_argument("--write", action="store_true", help="update docs/plants.md")
     parser.add_argument(
         "--colonoscope", action="store_true", help="the simulated colonoscope in place of plays"
     )
@@ -110,7 +110,7 @@ def main() -> None:
         ran = dict(run_parallel(colonoscope.simulate, both, options.workers, options.scheduler))
         text = colonoscope_table({job: ran[job] for job in both})
         if options.write:
-            insert(ROOT / "docs" / "robots.md", "colonoscope", text)
+            insert(ROOT / "docs" / "plants.md", "colonoscope", text)
         print(text)
         return
     counts = [options.dofs] if options.dofs else COUNTS
@@ -119,7 +119,7 @@ def main() -> None:
     rows = to_rows({job: done[job] for job in jobs})
     if options.write:
         head = f"Seeds {seeds[0]} to {seeds[-1]}; median and worst of all degrees of freedom.\n\n"
-        insert(ROOT / "docs" / "robots.md", "axes", head + table(rows))
+        insert(ROOT / "docs" / "plants.md", "axes", head + table(rows))
     print(json.dumps({"rows": rows}) if options.json else table(rows))
 
 

@@ -2,7 +2,7 @@
 
 The robot has three segments and nine tendons (TAUTSCOPE_DATA). Its static model is fitted on the
 first two thirds of the record; regressions and filters also learn in the last third from what they
-have seen. `--write` updates docs/robots.md.
+have seen. `--write` updates docs/plants.md.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="continuum", description=__doc__.splitlines()[0])
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="update docs/robots.md")
+    parser.add_argument("--write", action="store_true", help="update docs/plants.md")
     options = parser.parse_args()
     if not FILE.exists():
         parser.error(f"File not found: {FILE}. Set TAUTSCOPE_DATA to the folder of real data.")
@@ -130,7 +130,7 @@ def main() -> None:
     rows, known = to_rows(record, robot, found), facts(record, robot)
     text = table(rows, known)
     if options.write:
-        insert(ROOT / "docs" / "robots.md", "continuum", text)
+        insert(ROOT / "docs" / "plants.md", "continuum", text)
     print(json.dumps({"rows": rows, **known}) if options.json else text)
 
 
