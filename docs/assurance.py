@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import json
+import math
 import re
 import subprocess
 import tomllib
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
-from typing import Any
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -124,8 +123,8 @@ Each brings dependencies of its own; `uv tree --no-dev` lists them. Python itsel
 
 ## Rust crates in the extension module
 
-`crates/core`, the loop, needs `libm` alone. Crates that only generate code at build time are
-marked.
+`crates/core`, the loop, needs `libm` and `nalgebra` alone. Crates that only generate code at build
+time are marked.
 
 | crate | version | licence | |
 |---|---|---|---|"""
@@ -209,36 +208,25 @@ def python_licence(name: str) -> str:
 
 def crate_rows() -> Iterator[str]:
     """A row for each crate that the extension module is built of."""
-    command = ["cargo", "metadata", "--format-version=1", "--locked", "--offline"]
-    output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    document = json.loads(output)
-    packages = {package["id"]: package for package in document["packages"]}
-    nodes = {node["id"]: node for node in document["resolve"]["nodes"]}
-    root = next(key for key, each in packages.items() if each["name"] == "tautscope-bindings")
-    linked, built = set(), set()
-
-    def collect(key: str, is_built: bool) -> None:
-        is_built = is_built or _generates_code(packages[key])
-        if key in linked or (is_built and key in built):
-            return
-        (built if is_built else linked).add(key)
-        for dependency in nodes[key]["deps"]:
-            if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
-                collect(dependency["pkg"], is_built)
-
-    collect(root, False)
-    for key in sorted(
-        linked | built, key=lambda key: (packages[key]["name"], packages[key]["version"])
-    ):
-        package = packages[key]
-        if not package["name"].startswith("tautscope"):
-            mark = "" if key in linked else "at build time"
-            licence = package["license"].replace("/", " OR ")
-            yield f"| {package['name']} | {package['version']} | {licence} | {mark} |"
-
-
-def _generates_code(package: dict[str, Any]) -> bool:
-    return any("proc-macro" in target["kind"] for target in package["targets"])
+    command = ["cargo", "tree", "--package=tautscope-bindings", "--edges=normal", "--target=all"]
+    shown = ["--prefix=depth", "--format= {p}\t{l}", "--no-dedupe", "--locked", "--offline"]
+    lines = subprocess.run(
+        [*command, *shown], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    found: dict[tuple[str, str], tuple[str, bool]] = {}
+    generator = math.inf  # depth of the crate that generates code, above those that it needs
+    for line in lines.splitlines():
+        package, licence = line.split("\t")
+        depth, name, version, *marks = package.split()
+        if int(depth) <= generator:
+            generator = int(depth) if "(proc-macro)" in marks else math.inf
+        is_linked = generator == math.inf
+        key = name, version.removeprefix("v")
+        found[key] = licence, is_linked or found.get(key, ("", False))[1]
+    for (name, version), (licence, is_linked) in sorted(found.items()):
+        if not name.startswith("tautscope"):
+            mark = "" if is_linked else "at build time"
+            yield f"| {name} | {version} | {licence.replace('/', ' OR ')} | {mark} |"
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ typedef struct {
     double share;
 } LoopBlock;
 
-/* Creates the loop from the file of a configuration, without [[dof]] with every key; else 0, and `message` says why. */
+/* Creates the loop from the file of a configuration; else 0, and `message` says why. */
 static inline int block_create(LoopBlock *block, const char *file, char *message, size_t length) {
     TautscopeStatePrediction bands;
     FILE *stream = fopen(file, "rb");

@@ -1,7 +1,6 @@
 /* S-function of the loop for Simulink: a C-MEX file, Level 2. build.m compiles it.
 
-   Dialog parameters: file of the configuration, without [[dof]] with every key, as `tautscope config` prints it; share of the
-   compensation, 0 to 1.
+   Dialog parameters: file of the configuration; share of the compensation, 0 to 1.
    Input ports: 1 reference (n), 2 its age (s), 3 features (4), with [[dof]] the tip (n), 4 whether there is a new measurement,
    5 captured_at (s), 6 engage, acknowledge, drive fault (3).
    Output ports: 1 command (n), 2 delta_minus (n), 3 delta_plus (n), 4 state estimate (n),

@@ -5,8 +5,8 @@ classdef Loop < handle
     %   command = loop.step(reference, time);            % in every control period
     %   report = loop.on_tip(values, captured_at);       % whenever a sensor has measured the tip
     %
-    % The configuration is the name of a file, or text of several lines. With [[dof]] it has 1 to 8 degrees of freedom, and missing
-    % keys have their defaults. Without, it is of the article's instrument and has every key, as `tautscope config` prints it:
+    % The configuration is the name of a file, or text of several lines, in which missing keys have their defaults. With [[dof]] it
+    % has 1 to 8 degrees of freedom. Without, it is of the article's instrument:
     % on_features and on_frame take its images, and references and commands are [insertion, rotation, bending] in m, rad, rad.
     % Its key `profile` selects the profile. Times are s on one clock of yours. Pixels count from 0 at the centre of the first one:
     % subtract 1 from positions that MATLAB gives.

@@ -2,12 +2,12 @@ function test_errors(folder)
 % Bad input is an error that names the argument, and leaves the loop unchanged.
 config = fullfile(folder, 'paper.toml');
 expect('tautscope:Config', 'missing.toml', @() tautscope.Loop('missing.toml'));
-incomplete = [tempname '.toml'];
-id = fopen(incomplete, 'w');
-fprintf(id, 'profile = "best"\n');
+wrong = [tempname '.toml'];
+id = fopen(wrong, 'w');
+fprintf(id, 'law.tip_gian = 3.0\n');
 fclose(id);
-remove = onCleanup(@() delete(incomplete));
-expect('tautscope:Config', 'every key is needed', @() tautscope.Loop(incomplete));
+remove = onCleanup(@() delete(wrong));
+expect('tautscope:Config', 'law.tip_gian: unknown key', @() tautscope.Loop(wrong));
 
 loop = tautscope.Loop(config);
 assert(loop.period == 1e-3);

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use tautscope_axes::{AnyLoop, AxesSettings, Selection};
+use tautscope_config::{AnyLoop, AxesSettings, Selection};
 use tautscope_core as core;
 
 use crate::arrays::{Table, Vector, covariance as known, fixed, same_length};

@@ -9,8 +9,7 @@
 //! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px; one
 //! value per degree of freedom (DOF) is an array in the order insertion, rotation, bending.
 //!
-//! The example compensates one DOF by the article's scheme; `examples/whole_loop.rs` is the whole loop, with settings
-//! from a TOML file.
+//! The example compensates one DOF by the article's scheme; the crate `tautscope-config` builds the whole loop from TOML.
 //!
 //! ```
 //! use tautscope_core::{Compensator, CompensatorState, Estimator, EstimatorState, Play, PlayState};

@@ -488,9 +488,8 @@ const char *tautscope_error_message(void);
 
 // Creates a loop at rest.
 //
-// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. With `[[dof]]`, of which each needs a
-// `name` and a `width_limit`, keys that it does not have have their defaults; without, it has every key, as `tautscope config`
-// prints it. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
+// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. Keys that it does not have have their
+// defaults, but for `name` and `width_limit` of each `[[dof]]`. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
 //
 // # Safety
 // `toml` points to `length` readable bytes; `created` is writable.

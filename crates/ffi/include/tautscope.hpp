@@ -274,7 +274,7 @@ private:
 /// Finds the two marker bands in images; one thread at a time.
 class Detector {
 public:
-    /// From the configuration with every key, as `tautscope config` prints it.
+    /// From a configuration; keys that it does not have have their defaults.
     explicit Detector(std::string_view toml) : handle_(detail::create(&tautscope_detector_create, toml)) {}
 
     /// Detects near a prediction, or in the whole workspace.
@@ -294,7 +294,7 @@ private:
 /// The loop of the article's instrument: reference in, command out; one thread at a time.
 class Loop : public detail::AnyLoop {
 public:
-    /// From the configuration with every key, as `tautscope config` prints it.
+    /// From a configuration; keys that it does not have have their defaults.
     explicit Loop(std::string_view toml) : AnyLoop(toml) {}
 
     /// One control tick at `time` [s]: the command for a reference, made at `made_at` [s] if that is known.

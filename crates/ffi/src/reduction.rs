@@ -4,7 +4,7 @@
 use std::ffi::c_char;
 use std::ptr::null;
 
-use tautscope_axes::AnyLoop;
+use tautscope_config::AnyLoop;
 use tautscope_core::{Axes, BandLoop, DOFS};
 
 use crate::document::{LoopDocument, Sensors};
@@ -78,9 +78,8 @@ impl TautscopeLoop {
 
 /// Creates a loop at rest.
 ///
-/// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. With `[[dof]]`, of which each needs a
-/// `name` and a `width_limit`, keys that it does not have have their defaults; without, it has every key, as `tautscope config`
-/// prints it. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
+/// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. Keys that it does not have have their
+/// defaults, but for `name` and `width_limit` of each `[[dof]]`. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
 ///
 /// # Safety
 /// `toml` points to `length` readable bytes; `created` is writable.

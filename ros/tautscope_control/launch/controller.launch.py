@@ -22,7 +22,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "config",
-                description="Configuration with every key, as `tautscope config` prints it",
+                description="Configuration; missing keys have their defaults",
             ),
             Node(
                 package="robot_state_publisher",

@@ -45,8 +45,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument(
                 "config",
-                description="Configuration; of tautscope_control with every key, as "
-                "`tautscope config` prints it",
+                description="Configuration; missing keys have their defaults",
             ),
             DeclareLaunchArgument("namespace", default_value="instrument"),
             DeclareLaunchArgument("image_topic", default_value="/endoscope/image_raw"),

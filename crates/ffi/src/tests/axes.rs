@@ -36,52 +36,6 @@ fn create(toml: &str) -> (TautscopeResult, *mut TautscopeLoop) {
 }
 
 #[test]
-fn configurations_that_are_wrong_name_their_key() {
-    let dof = |keys: &str| format!("{ONE}{keys}");
-    for (toml, words) in [
-        (String::new(), "[[dof]]"),
-        (named(9), "1 to 8 degrees of freedom"),
-        ("[[dof]]\nname = \"a\"".into(), "width_limit"),
-        ("[[dof]]\nwidth_limit = 1".into(), "name"),
-        (ONE.repeat(2), "dof.name"),
-        (dof("widht = 3"), "dof.widht: unknown key"),
-        (dof("lever = \"long\""), "expected f64"),
-        (dof("range = [2, 1]"), "range"),
-        (dof("range = [-180, 180]"), "not mm and degrees"),
-        (dof("speed = -1"), "speed: got -1"),
-        (dof("expected_width = 2"), "expected_width"),
-        (dof("gain_limit = 0.5"), "gain"),
-        (dof("delta_minus = 1"), "delta"),
-        (
-            dof("unit = \"mm\""),
-            "dof.unit: got \"mm\", expected \"m\" or \"rad\"",
-        ),
-        (
-            dof("[kinematics]\nkind = \"two_planes\""),
-            "kinematics.kind: got \"two_planes\", expected \"joints\"",
-        ),
-        (dof("[saftey]"), "saftey: unknown key"),
-        (dof("[safety]\nframe_aeg = 1"), "safety.frame_aeg"),
-        (
-            dof("[safety]\nwidth_limit = [1, 1, 1]"),
-            "safety.width_limit",
-        ),
-        (dof("[control]\nperiod = 0"), "period"),
-        (dof("[law]\ntip_gain = -1"), "tip_gain"),
-        (format!("profile = \"worst\"\n{ONE}"), "worst"),
-        ("dof = 1".into(), "dof"),
-        ("dof = [1]".into(), "dof"),
-        ("control = 1".into(), "control"),
-        ("=".into(), "configuration"),
-    ] {
-        let (result, handle) = create(&toml);
-        assert_eq!(result, TautscopeResult::Config, "{toml}");
-        assert!(message().contains(words), "{toml}: {}", message());
-        assert!(handle.is_null());
-    }
-}
-
-#[test]
 fn any_count_of_dofs_from_one_to_eight_has_a_loop() {
     for count in 1..=8 {
         let (result, handle) = create(&named(count));

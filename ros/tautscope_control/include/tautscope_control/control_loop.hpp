@@ -77,7 +77,7 @@ std::string flag_names(std::uint32_t flags);
 /// blocks or reads a clock. Times are seconds on one clock, the same for references, ticks and images.
 class ControlLoop {
 public:
-    /// From a configuration, without `[[dof]]` with every key, as `tautscope config` prints it. Throws `tautscope::Error`.
+    /// From a configuration, whose missing keys have their defaults. Throws `tautscope::Error`.
     explicit ControlLoop(const std::string &toml);
 
     /// Names of the degrees of freedom.

@@ -42,7 +42,7 @@ public:
     /// Called in the detection thread when an image cannot be used.
     using OnError = std::function<void(const std::string &)>;
 
-    /// From the configuration with every key. `exchange` must outlive the worker. Throws `tautscope::Error`.
+    /// From the configuration. `exchange` must outlive the worker. Throws `tautscope::Error`.
     DetectionWorker(const std::string &toml, DetectionExchange &exchange, OnReport on_report, OnError on_error);
 
     ~DetectionWorker();

@@ -1,81 +1,11 @@
-//! The loop of a configuration, for Python and for C: of the article's instrument, or of 1 to 8 degrees of freedom of `[[dof]]`.
+//! The loop of the degrees of freedom of `[[dof]]`.
 //!
 //! The only place with the ratios by which the settings of a degree of freedom follow from its `width_limit`.
 
-use std::ops::{Deref, DerefMut};
-
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use tautscope_core as core;
 
-/// The loop of a robot.
-pub enum AnyLoop {
-    /// Of the article's instrument.
-    Bands(Box<dyn core::BandLoop + Send + Sync>),
-    /// Of the degrees of freedom of `[[dof]]`.
-    Axes(Box<dyn core::Axes + Send + Sync>),
-}
-
-/// What selects the loop of a configuration.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Selection {
-    #[serde(default)]
-    profile: Profile,
-    #[serde(default)]
-    dof: Vec<IgnoredAny>,
-}
-
-/// The profiles of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Profile {
-    /// The article's blocks.
-    Paper,
-    /// The vector law on one linear filter of fixed plays.
-    #[default]
-    Best,
-}
-
-impl Selection {
-    /// Whether the configuration has `[[dof]]`.
-    pub const fn has_axes(&self) -> bool {
-        !self.dof.is_empty()
-    }
-
-    /// The loop of the article's instrument at rest.
-    ///
-    /// # Errors
-    /// A setting is out of range.
-    pub fn build_bands(&self, settings: &core::Settings) -> Result<AnyLoop, core::ConfigError> {
-        let storage = vec![core::Entry::BLANK; settings.history_entries()];
-        Ok(AnyLoop::Bands(match self.profile {
-            Profile::Paper => Box::new(Bands::<core::Paper>::new(settings, storage)?),
-            Profile::Best => Box::new(Bands::<core::Best>::new(settings, storage)?),
-        }))
-    }
-}
-
-type Bands<P> = core::HysteresisReduction<P, Vec<core::Entry>>;
-
-impl Deref for AnyLoop {
-    type Target = dyn core::Loop;
-
-    fn deref(&self) -> &Self::Target {
-        match self {
-            Self::Bands(inner) => inner.as_ref(),
-            Self::Axes(inner) => inner.as_ref(),
-        }
-    }
-}
-
-impl DerefMut for AnyLoop {
-    fn deref_mut(&mut self) -> &mut Self::Target {
-        match self {
-            Self::Bands(inner) => inner.as_mut(),
-            Self::Axes(inner) => inner.as_mut(),
-        }
-    }
-}
+use crate::any_loop::{AnyLoop, Profile};
 
 // The article's instrument has about these ratios of its lengths to safety.width_limit.
 const OFFSET_LIMIT: f64 = 2.0 / 3.0;

@@ -1,4 +1,4 @@
-"""The defaults of the C interface with [[dof]] are those of Python."""
+"""The defaults of the Rust crates and of the C interface are those of Python."""
 
 import os
 
@@ -6,10 +6,10 @@ from common.paths import ROOT
 from tautscope import axes
 from tautscope.config import dump_config
 
-DEFAULTS = ROOT / "crates" / "ffi" / "src" / "defaults.toml"
+DEFAULTS = ROOT / "crates" / "config" / "src" / "defaults.toml"
 
 
-def test_the_defaults_in_c_are_these() -> None:
+def test_the_defaults_in_rust_are_these() -> None:
     text = dump_config(axes(1, width_limit=1.0))
     if "TAUTSCOPE_WRITE_DEFAULTS" in os.environ:
         DEFAULTS.write_text(text, encoding="utf-8")

@@ -1,8 +1,7 @@
 //! The whole loop of Fig. 6 on a simulated instrument: three plays in the images of an ideal camera with 80 ms latency.
 //!
 //! ```sh
-//! uv run tautscope config > rig.toml
-//! cargo run -p tautscope-core --features serde --example whole_loop -- rig.toml
+//! cargo run --package tautscope-config --example whole_loop [rig.toml]
 //! ```
 //!
 //! It prints the RMS distance of the tip from the reference, without and with compensation.
@@ -10,6 +9,7 @@
 use std::error::Error;
 use std::f64::consts::TAU;
 
+use tautscope_config::Configuration;
 use tautscope_core::{Entry, HysteresisReduction, Paper, Play, PlayState, Settings};
 
 /// Widths of the plays: Table 1 of the article [m, rad, rad].
@@ -23,10 +23,9 @@ const TICKS_PER_FRAME: u32 = 8;
 const LATENCY: f64 = 0.08;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .ok_or("name a TOML file, for example one written by `uv run tautscope config`")?;
-    let settings: Settings = toml::from_str(&std::fs::read_to_string(path)?)?;
+    let path = std::env::args().nth(1);
+    let text = path.map_or_else(|| Ok(String::new()), std::fs::read_to_string)?;
+    let settings: Settings = Configuration::parse(&text)?.read()?;
     let mut bare = settings;
     for dof in [&mut bare.insertion, &mut bare.rotation, &mut bare.bending] {
         dof.free_gain = 1.0;

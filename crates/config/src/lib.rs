@@ -1,0 +1,11 @@
+#![doc = include_str!("../README.md")]
+
+mod any_loop;
+mod axes;
+#[cfg(feature = "toml")]
+mod document;
+
+pub use any_loop::{AnyLoop, Profile, Selection};
+pub use axes::{AxesSettings, AxisSettings, MOST_RANGE, SPEED};
+#[cfg(feature = "toml")]
+pub use document::{Configuration, Dof, Error};
