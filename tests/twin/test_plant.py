@@ -13,14 +13,15 @@ from tautscope.dof import Dof
 from tautscope.report.metrics import loop_width
 from tautscope.twin.plant import Plant
 
+CONFIG = Config()
+
 
 def plant_for(seed=0, **changes):
     return Plant(load_config().replace(**changes), np.random.default_rng(seed))
 
 
-def posture(config=None):
-    config = config or Config()
-    return np.array([config.experiment[dof].centre for dof in Dof])
+def posture():
+    return np.array([CONFIG.experiment[dof].centre for dof in Dof])
 
 
 def sweep(plant, dof, *, periods=1.25, slow=0.6, with_insertion=0.0):
@@ -146,7 +147,7 @@ def test_another_control_period_is_the_same_instrument():
     config = Config()
     commands, tips = [], []
     for k in range(2000):
-        command = posture(config)
+        command = posture()
         command[0] += config.experiment.insertion.amplitude * np.sin(2 * np.pi * (k + 1) / 1000)
         coarse.step(command)
         commands.append(command[0])

@@ -8,10 +8,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any
 
 import msgspec
 from msgspec import Struct
-from msgspec.inspect import FloatType, IntType, TupleType, type_info
+from msgspec.inspect import Field, FloatType, IntType, TupleType, type_info
 from msgspec.structs import fields
 
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
@@ -269,12 +271,11 @@ def _check_drives(drives: DrivesConfig) -> None:
 
 def check_ranges(config: Struct) -> None:
     """Check that numbers are of the order of their defaults; keys from the root."""
-    defaults = {field.name: field.default_factory for field in fields(config)}
+    defaults = _defaults(type(config))
     unusual: tuple[str, ...] = config.safety.unusual  # type: ignore[attr-defined]
     known = {"safety.command_travel"}
     for name in RANGED:
-        section, default = getattr(config, name), defaults[name]()
-        for path, value, usual, is_positive in _ranged(name, section, default):
+        for path, value, usual, is_positive in _ranged(name, getattr(config, name), defaults[name]):
             key = path.partition("[")[0]
             known.add(key)
             low, high = usual / MOST_RATIO * is_positive, usual * MOST_RATIO
@@ -283,11 +284,24 @@ def check_ranges(config: Struct) -> None:
     _require_names("safety.unusual", unusual, sorted(known))
 
 
+@cache
+def _defaults(config: type[Struct]) -> dict[str, Any]:
+    """Default of each section with ranges."""
+    factories = {field.name: field.default_factory for field in fields(config)}
+    return {name: factories[name]() for name in RANGED}
+
+
+@cache
+def _fields(section: type[Struct]) -> tuple[Field, ...]:
+    """Fields of a section with their types, which take long to read."""
+    return type_info(section).fields  # type: ignore[attr-defined, no-any-return]
+
+
 def _ranged(
     path: str, section: Struct, default: Struct
 ) -> Iterator[tuple[str, float, float, bool]]:
     """Path, value, default, and whether it has to be above 0, of the numbers without a limit."""
-    for field in type_info(type(section)).fields:  # type: ignore[attr-defined]
+    for field in _fields(type(section)):
         place = f"{path}.{field.name}"
         value, usual = getattr(section, field.name), getattr(default, field.name)
         if isinstance(value, Struct):
