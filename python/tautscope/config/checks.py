@@ -9,11 +9,11 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from operator import attrgetter
 
 import msgspec
 from msgspec import Struct
-from msgspec.inspect import Field, FloatType, IntType, TupleType, type_info
+from msgspec.inspect import FloatType, IntType, TupleType, type_info
 from msgspec.structs import fields
 
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
@@ -271,51 +271,42 @@ def _check_drives(drives: DrivesConfig) -> None:
 
 def check_ranges(config: Struct) -> None:
     """Check that numbers are of the order of their defaults; keys from the root."""
-    defaults = _defaults(type(config))
     unusual: tuple[str, ...] = config.safety.unusual  # type: ignore[attr-defined]
-    known = {"safety.command_travel"}
-    for name in RANGED:
-        for path, value, usual, is_positive in _ranged(name, getattr(config, name), defaults[name]):
-            key = path.partition("[")[0]
-            known.add(key)
-            low, high = usual / MOST_RATIO * is_positive, usual * MOST_RATIO
+    ranges = _ranges(type(config))
+    for key, index, low, high in ranges:
+        value = attrgetter(key)(config)
+        one = value if index is None else value[index]
+        if not (low <= one <= high or key in unusual):
+            path = key if index is None else f"{key}[{index}]"
             allowed = f"{low:.3g} to {high:.3g}, or {key} named in safety.unusual"
-            _require(low <= value <= high or key in unusual, path, value, allowed)
-    _require_names("safety.unusual", unusual, sorted(known))
+            raise ConfigError(path, one, allowed)
+    if unusual:
+        known = {"safety.command_travel", *(key for key, *_ in ranges)}
+        _require_names("safety.unusual", unusual, sorted(known))
 
 
 @cache
-def _defaults(config: type[Struct]) -> dict[str, Any]:
-    """Default of each section with ranges."""
+def _ranges(config: type[Struct]) -> tuple[tuple[str, int | None, float, float], ...]:
+    """Key, index in a list, least and largest value of the numbers without a limit."""
     factories = {field.name: field.default_factory for field in fields(config)}
-    return {name: factories[name]() for name in RANGED}
+    return tuple(one for name in RANGED for one in _ranged(name, factories[name]()))
 
 
-@cache
-def _fields(section: type[Struct]) -> tuple[Field, ...]:
-    """Fields of a section with their types, which take long to read."""
-    return type_info(section).fields  # type: ignore[attr-defined, no-any-return]
-
-
-def _ranged(
-    path: str, section: Struct, default: Struct
-) -> Iterator[tuple[str, float, float, bool]]:
-    """Path, value, default, and whether it has to be above 0, of the numbers without a limit."""
-    for field in _fields(type(section)):
-        place = f"{path}.{field.name}"
-        value, usual = getattr(section, field.name), getattr(default, field.name)
-        if isinstance(value, Struct):
-            yield from _ranged(place, value, usual)
+def _ranged(path: str, default: Struct) -> Iterator[tuple[str, int | None, float, float]]:
+    for field in type_info(type(default)).fields:  # type: ignore[attr-defined]
+        key, usual = f"{path}.{field.name}", getattr(default, field.name)
+        if isinstance(usual, Struct):
+            yield from _ranged(key, usual)
             continue
         is_list = isinstance(field.type, TupleType)
-        kinds = field.type.item_types if is_list else (field.type,)
-        values, defaults = (value, usual) if is_list else ((value,), (usual,))
-        for index, (kind, one, of) in enumerate(zip(kinds, values, defaults, strict=True)):
+        kinds, values = (field.type.item_types, usual) if is_list else ((field.type,), (usual,))
+        for index, (kind, one) in enumerate(zip(kinds, values, strict=True)):
             if not isinstance(kind, FloatType | IntType):
                 continue
             is_positive = isinstance(kind, FloatType) and kind.gt is not None
-            if of and kind.lt is kind.le is None and (is_positive or kind.ge is not None):
-                yield f"{place}[{index}]" if is_list else place, one, of, is_positive
+            if one and kind.lt is kind.le is None and (is_positive or kind.ge is not None):
+                low = one / MOST_RATIO * is_positive
+                yield key, index if is_list else None, low, one * MOST_RATIO
 
 
 def _require(is_valid: bool, field: str, value: object, allowed: str) -> None:
