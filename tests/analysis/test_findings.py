@@ -40,6 +40,53 @@ def test_missing_values_and_outliers_are_left_out(seed: int) -> None:
         assert np.isnan(verdict.record.measured[50::100]).all()
 
 
+@pytest.mark.parametrize("value", [-9999.0, -1.0e6, 999.9, 32767.0])
+def test_values_that_mark_missing_tips_are_left_out(value: float) -> None:
+    record = simulate("play", 1).record
+    tip = record.measured.copy()
+    tip[50::100] = value
+    cleaned, [finding] = without_errors(replace(record, measured=tip))
+    assert f"such as {value:.6g}" in str(finding)
+    tip[50::100] = np.nan
+    np.testing.assert_array_equal(cleaned.measured, tip)
+
+
+@pytest.mark.parametrize(
+    ("period", "low"),
+    [(2**16, -(2**15)), (2**16, 0), (2**12, 0), (2**24, 0), (360, -180), (360, 0), (2 * np.pi, 0)],
+)
+def test_counters_and_angles_of_each_range_are_unwrapped(period: float, low: float) -> None:
+    record = simulate("linear", 0).record
+    signal = 2.5 * period / np.ptp(record.command) * record.command
+    cleaned, [finding] = without_errors(replace(record, command=(signal - low) % period + low))
+    assert f"command: wraps at a range of {period:.6g}" in str(finding)
+    np.testing.assert_allclose(np.diff(cleaned.command), np.diff(signal), atol=1e-9 * period)
+
+
+RISE = np.linspace(0, 1, 1500)
+ONE_WAY = {
+    "ramp": 20 * RISE,
+    "ramp down": -20 * RISE,
+    "faster and faster": 20 * RISE**2,
+    "stairs": 2 * np.floor(10 * RISE),
+    "ramp with a ripple below the slack": 20 * RISE + 1.5 * np.sin(60 * RISE),
+    "there and back": 20 * (1 - np.abs(2 * RISE - 1)),
+}
+
+
+@pytest.mark.parametrize("command", ONE_WAY.values(), ids=list(ONE_WAY))
+def test_motion_in_one_direction_gets_no_settings(command: np.ndarray) -> None:
+    time = 40 * RISE
+    tip = play(command, -2, 2) + np.random.default_rng(2).normal(0, 0.05, len(time))
+    record = replace(simulate("play", 0).record, command=command, measured=tip, time=time,
+                     rows=np.arange(len(time)))  # fmt: skip
+    verdict = judge(record)
+    assert verdict.settings is None
+    assert not verdict.found.is_aligned
+    assert "the tip reverses" in verdict.text
+    assert "Next: record at least ten strokes" in verdict.text
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_wrapped_counters_are_unwrapped(seed: int) -> None:
     truth = simulate("play", seed)
