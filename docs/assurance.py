@@ -92,6 +92,7 @@ PURPOSE = {
     "mujoco": "physics of the twin; not in the loop",
     "opencv-python-headless": "images of the twin; PNG and JPEG of logs",
     "mcap": "records of logs",
+    "ruamel.yaml": "camera_info files of ROS; not in the loop",
     "av": "camera sources and video files",
     "canopen": "SDO transfers and EDS files of drives",
     "python-can": "CAN frames: set-points, heartbeats, quick stop",

@@ -1,9 +1,11 @@
 """Prediction of the tip on records, by the weighted mixture and all other models of `analyze`.
 
 Records of real tools (TAUTSCOPE_DATA), and synthetic families; the loop's own filter by itself on
-the records of real tools and of a real continuum robot (`--only loop`); and the compensator that
-`analyze` writes, on the other half of its record (`--only compensator`); and the time that the
-episodes of a data set take (`--only episodes`). `--write` updates docs/models.md.
+the records of real tools and of a real continuum robot (`--only loop`). Of the verdict: whether it
+is right on simulated records of known truth (`--only honest`); what it says of real ones (`--only
+verdicts`), with figures to look at (`--figures`); its compensator on the other half of its record
+(`--only compensator`); the time that the episodes of a data set take (`--only episodes`). `--write`
+updates docs/models.md and docs/verdicts.md.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
-from records import compensator, lerobot, loop
+from records import compensator, honest, lerobot, loop, verdicts
 from records.evaluation import Job, Result, evaluate
 from records.families import FAMILIES
 from records.tools import SPLICED, tools
@@ -34,6 +36,9 @@ FIRST_SEED, SEEDS = 100, 5
 GOAL, STROKES_GOAL, WORSE_GOAL = 1.05, 2, 2
 """Largest ratio to the best other model, strokes to follow a change, and strokes worse than the
 trivial predictors."""
+
+OF_VERDICTS = ("honest", "verdicts", "compensator")
+"""Tables of docs/verdicts.md."""
 
 Results = dict[str, list[list[Result]]]
 """By name: per seed, per horizon."""
@@ -144,13 +149,32 @@ def measure_compensators(options: argparse.Namespace) -> dict[str, list[compensa
     return {name: done[name] for name in names}
 
 
+def judge_all(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """The tables of docs/verdicts.md that are asked for, by their names."""
+    parts = []
+    if options.only in (None, "honest"):
+        jobs = honest.jobs()
+        outcomes = dict(run_parallel(honest.evaluate, jobs, options.workers, options.scheduler))
+        parts.append(("honest", honest.table({job: outcomes[job] for job in jobs})))
+    if options.only in (None, "verdicts"):
+        real = [(name, options.figures) for name in verdicts.names()]
+        answers = dict(run_parallel(verdicts.evaluate, real, options.workers, options.scheduler))
+        parts.append(("verdicts", verdicts.table({job[0]: answers[job] for job in real})))
+        for name, _ in real if options.figures else ():
+            text = answers[name, options.figures].text
+            (options.figures / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
+    if options.only in (None, "compensator"):
+        parts.append(("compensator", compensator.table(measure_compensators(options))))
+    return parts
+
+
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="per family [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
     parser.add_argument(
         "--only",
-        choices=["tools", "families", "loop", "compensator", "episodes"],
+        choices=["tools", "families", "loop", *OF_VERDICTS, "episodes"],
         help="[all but episodes]",
     )
     parser.add_argument(
@@ -159,16 +183,21 @@ def arguments() -> argparse.Namespace:
         metavar="FILE",
         help="output of --only loop --json with another state, to compare the filter with",
     )
+    parser.add_argument(
+        "--figures", type=Path, metavar="FOLDER", help="figures and verdicts of the real records"
+    )
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="update docs/models.md")
+    parser.add_argument("--write", action="store_true", help="update the pages")
     options = parser.parse_args()
-    is_whole = options.only in (None, "loop", "compensator")
-    if options.write and not (is_whole and tools()):
+    is_whole = options.only in (None, "loop", *OF_VERDICTS)
+    if options.write and not (is_whole and (tools() or options.only == "honest")):
         parser.error(
             "--write updates whole tables: use it with TAUTSCOPE_DATA, and without --only or with "
-            "--only loop or compensator"
+            f"--only loop, {', '.join(OF_VERDICTS)}"
         )
+    if options.figures is not None:
+        options.figures.mkdir(parents=True, exist_ok=True)
     return options
 
 
@@ -181,7 +210,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     parts: list[tuple[str, str]] = []
     facts: dict[str, Any] = {"seeds": list(seeds)}
-    if options.only not in ("loop", "compensator"):
+    if options.only not in ("loop", *OF_VERDICTS):
         rows = to_rows(measure(options, seeds))
         conditions = f"Families: seeds {seeds[0]} to {seeds[-1]}, median (worst)."
         parts.append(("records", f"{conditions}\n\n{table(rows)}"))
@@ -194,14 +223,14 @@ def main() -> None:
         rows += of_filter
         parts.append(("loop", loop.table(errors, of_filter)))
         facts["errors"] = errors
-    if options.only in (None, "compensator"):
-        parts.append(("compensator", compensator.table(measure_compensators(options))))
+    of_verdicts = judge_all(options)
     if options.json:
         print(json.dumps({"rows": rows, **facts}))
     else:
-        print("\n\n".join(text for _, text in parts))
-    for name, text in parts if options.write else ():
-        insert(ROOT / "docs" / "models.md", name, text)
+        print("\n\n".join(text for _, text in parts + of_verdicts))
+    for page, tables in (("models.md", parts), ("verdicts.md", of_verdicts)):
+        for name, text in tables if options.write else ():
+            insert(ROOT / "docs" / page, name, text)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.text import Annotation
-from simulated import simulate
+from records.simulated import simulate
 from tautscope.analysis.compensation import as_played, plant, run
 from tautscope.analysis.compensator import compensator
 from tautscope.analysis.slide import slide

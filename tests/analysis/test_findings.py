@@ -1,11 +1,15 @@
 """What is wrong with samples is named with its lines, and does not change the result."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from play_model import play
-from simulated import Simulated, simulate
+from records.simulated import Simulated, simulate
+from scipy.signal import lfilter
+from tautscope.analysis.findings import without_errors
+from tautscope.analysis.identification import identify
 from tautscope.analysis.verdict import Verdict, judge
 
 SEEDS = range(2)
@@ -36,6 +40,54 @@ def test_missing_values_and_outliers_are_left_out(seed: int) -> None:
         assert np.isnan(verdict.record.measured[50::100]).all()
 
 
+@pytest.mark.parametrize("value", [-9999.0, -1.0e6, 999.9, 32767.0])
+def test_values_that_mark_missing_tips_are_left_out(value: float) -> None:
+    record = simulate("play", 1).record
+    tip = record.measured.copy()
+    is_missing = np.arange(len(tip)) % 100 < 8
+    tip[is_missing] = value
+    cleaned, [finding] = without_errors(replace(record, measured=tip))
+    assert f"such as {value:.6g}" in str(finding)
+    tip[is_missing] = np.nan
+    np.testing.assert_array_equal(cleaned.measured, tip)
+
+
+@pytest.mark.parametrize(
+    ("period", "low"),
+    [(2**16, -(2**15)), (2**16, 0), (2**12, 0), (2**24, 0), (360, -180), (360, 0), (2 * np.pi, 0)],
+)
+def test_counters_and_angles_of_each_range_are_unwrapped(period: float, low: float) -> None:
+    record = simulate("linear", 0).record
+    signal = 2.5 * period / np.ptp(record.command) * record.command
+    cleaned, [finding] = without_errors(replace(record, command=(signal - low) % period + low))
+    assert f"command: wraps at a range of {period:.6g}" in str(finding)
+    np.testing.assert_allclose(np.diff(cleaned.command), np.diff(signal), atol=1e-9 * period)
+
+
+RISE = np.linspace(0, 1, 1500)
+ONE_WAY = {
+    "ramp": 20 * RISE,
+    "ramp down": -20 * RISE,
+    "faster and faster": 20 * RISE**2,
+    "stairs": 2 * np.floor(10 * RISE),
+    "ramp with a ripple below the slack": 20 * RISE + 1.5 * np.sin(60 * RISE),
+    "there and back": 20 * (1 - np.abs(2 * RISE - 1)),
+}
+
+
+@pytest.mark.parametrize("command", ONE_WAY.values(), ids=list(ONE_WAY))
+def test_motion_in_one_direction_gets_no_settings(command: np.ndarray) -> None:
+    time = 40 * RISE
+    tip = play(command, -2, 2) + np.random.default_rng(2).normal(0, 0.05, len(time))
+    record = replace(simulate("play", 0).record, command=command, measured=tip, time=time,
+                     rows=np.arange(len(time)))  # fmt: skip
+    verdict = judge(record)
+    assert verdict.settings is None
+    assert not verdict.found.is_aligned
+    assert "the tip reverses" in verdict.text
+    assert "Next: record at least ten strokes" in verdict.text
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_wrapped_counters_are_unwrapped(seed: int) -> None:
     truth = simulate("play", seed)
@@ -44,6 +96,47 @@ def test_wrapped_counters_are_unwrapped(seed: int) -> None:
     verdict = judge(replace(truth.record, command=wrapped))
     assert_found(truth, verdict, "command: wraps at a range of 65536", seed)
     np.testing.assert_array_equal(np.diff(verdict.record.command), np.diff(counts))
+
+
+def test_a_noisy_counter_that_wraps_is_unwrapped() -> None:
+    """Steps by noise of up to a quarter of the range of the counter."""
+    truth = simulate("play", 1)
+    noise = np.random.default_rng(1).normal(0, 2**16 / 20, len(truth.record.command))
+    counts = np.round(4000 * truth.record.command + noise)
+    wrapped = (counts + 2**15) % 2**16 - 2**15
+    cleaned, findings = without_errors(replace(truth.record, measured=wrapped))
+    assert "tip: wraps at a range of 65536" in str(findings[0])
+    np.testing.assert_array_equal(np.diff(cleaned.measured), np.diff(counts))
+
+
+def test_a_curve_is_named_and_a_line_is_not() -> None:
+    """A gain that falls by a third from one end to the other, with and without slack."""
+    for kind in ("linear", "play"):
+        record = simulate(kind, 3).record
+        tip = record.measured - record.measured.mean()
+        curved = tip + 0.1 * tip**2 / np.abs(tip).max()
+        assert not any("curve" in str(each) for each in judge(record).findings), kind
+        verdict = judge(replace(record, measured=curved))
+        assert any("tip: it follows the command in a curve" in str(x) for x in verdict.findings)
+
+
+def test_nothing_drifts_before_the_fit_begins() -> None:
+    """Short strokes that the fit leaves out, then nineteen long ones, with noise."""
+    time = np.arange(1500) * 0.02
+    command = np.where(time < 11, 0.3, 10) * np.sin(2 * np.pi * time / 2)
+    tip = play(command, -1, 1) + np.random.default_rng(0).normal(0, 1, len(time))
+    assert np.ptp(identify(time, command, tip).drift) < 0.5
+
+
+def test_the_next_step_is_that_for_what_is_missing() -> None:
+    few = simulate("play", 0).record  # known to ± 14 %
+    assert re.search(r"record about \d+ strokes in place of \d+", judge(few).text)
+    assert "check that the two columns belong" in judge(simulate("random walk", 0).record).text
+    lag = simulate("linear", 2).record
+    tip = lfilter([0.05], [1, -0.95], lag.measured - 5)
+    verdict = judge(replace(lag, measured=tip))
+    assert verdict.settings is None
+    assert "at half the speed: a lag shrinks" in verdict.text or verdict.found.is_aligned
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from simulated import simulate
+from play_model import play
+from records.simulated import UNDETERMINED, WITHOUT_SLACK, simulate
 from tautscope.analysis.identification import Identification, identify
 
 SEEDS = range(6)
 WITH_SLACK = ("play", "asymmetric", "rounded", "delay and play", "drift")
-WITHOUT_SLACK = ("delay only", "linear")
-UNDETERMINED = ("random walk", "two random walks", "white noise", "one way", "small strokes")
 
 
 def found(kind: str, seed: int) -> Identification:
@@ -42,6 +41,18 @@ def test_a_tip_without_slack_is_aligned(kind: str) -> None:
         assert result.delay.value == pytest.approx(truth.delay, abs=0.02), seed
         aligned += result.is_aligned
     assert aligned >= len(SEEDS) - 1
+
+
+def test_noise_is_no_reason_to_say_that_there_is_no_slack() -> None:
+    """Slack of 2 to 10 % of the range under noise of 5 %: found, or unknown."""
+    rng = np.random.default_rng(4)
+    time = np.arange(2000) * 0.02
+    command = 10 * np.sin(2 * np.pi * time / 4)
+    for width in (0.4, 0.8, 1.2, 2.0):
+        tip = play(command, -width / 2, width / 2) + rng.normal(0, 1.0, len(time))
+        result = identify(time, command, tip)
+        assert result.width.low > 0, width
+        assert not result.is_aligned, (width, result.width)
 
 
 @pytest.mark.parametrize("kind", UNDETERMINED)

@@ -132,6 +132,18 @@ def test_implausible_and_unknown_units_are_refused(tmp_path: Path) -> None:
         parse_units("tip=mm")
 
 
+@pytest.mark.parametrize("word", ["Degree", "degrees", "DEG", "°", "furlong", "gon", "Degreee"])
+def test_the_unit_of_a_motor_is_known_or_refused(tmp_path: Path, word: str) -> None:
+    file = tmp_path / "motors.csv"
+    text = f"time [s],insertion [mm],rotation [{word}],bending [rad]\n0,1,90,0\n1,1,180,0\n"
+    file.write_text(text, encoding="utf-8")
+    if word in ("furlong", "gon", "Degreee"):
+        with pytest.raises(RecordError, match=rf"rotation \[{word}\]: got 'unit {word}'"):
+            read_motors(file)
+    else:
+        np.testing.assert_allclose(read_motors(file)[1][:, 1], [np.pi / 2, np.pi])
+
+
 def test_titles_with_units() -> None:
     assert split_unit("tip [mm]") == ("tip", "mm")
     assert split_unit(" tip_deg ") == ("tip", "deg")

@@ -72,6 +72,8 @@ class Signals:
             if duration == 0
             else (2 * (self.time - time[0]) / duration - 1)
         )
+        fitted = x[self.where]
+        x = np.clip(x, fitted[0], fitted[-1])  # a polynomial says nothing outside
         degree = 3 if len(at) >= 12 else 1
         self.drifts = np.polynomial.legendre.legvander(x, degree)
 

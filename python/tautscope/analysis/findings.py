@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.analysis.identification import Identification, identify
-from tautscope.analysis.models.task import Floats
+from tautscope.analysis.models.task import Floats, fit_samples
 from tautscope.runs.records import LONGEST_INTERVAL, Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
@@ -25,6 +25,8 @@ SPIKE = 0.3
 """Least height of an outlier, as a share of the range."""
 FEW = 1e-3
 """Share of samples that may repeat a value by chance, and do not matter."""
+CURVED = 0.8
+"""Error that a cubic leaves, over that of a line, below which the relation is curved."""
 _FACTORS = {
     1000.0: "the number of mm in 1 m",
     180 / np.pi: "the number of degrees in a radian",
@@ -153,6 +155,22 @@ def gain_finding(record: Record, gain: float) -> Finding | None:
     return None
 
 
+def curve_finding(record: Record, found: Identification) -> Finding | None:
+    """Whether the gain changes over the range: a cubic of the model explains much of its error."""
+    seen = fit_samples(record.command, record.measured)
+    path = (found.predicted - found.drift)[seen]
+    error = (record.measured - found.predicted)[seen]
+    extent = float(np.ptp(path))
+    powers = np.polynomial.legendre.legvander(2 * (path - path.min()) / extent - 1, 3)
+    curve = powers @ np.linalg.lstsq(powers, error, rcond=None)[0]
+    if float(np.std(error - curve)) > CURVED * float(np.std(error)):
+        return None
+    off = float(np.max(np.abs(curve)))
+    if off < 0.02 * extent:
+        return None
+    return Finding("tip", f"it follows the command in a curve, up to {off:.3g} off a line")
+
+
 def _time_findings(record: Record) -> Iterator[Finding]:
     if record.time is None:
         return
@@ -183,12 +201,14 @@ def _unwrapped(values: Floats) -> tuple[Floats, float, NDArray[np.intp]]:
     extent = float(np.ptp(values[seen]))
     for period in WRAPS:
         is_wrap = sizes > period / 2
-        if not is_wrap.any() or extent > period * (1 + 1e-6) or usual > period / 8:
+        if not is_wrap.any() or extent > period * (1 + 1e-6):
             continue
-        if np.count_nonzero(is_wrap) > len(sizes) / 10:
+        if np.count_nonzero(is_wrap) > len(sizes) / 4:
             continue
-        rest = period - sizes[is_wrap]
-        if np.all(np.abs(rest) <= 3 * max(usual, float(np.max(sizes[~is_wrap], initial=0.0)))):
+        largest = float(np.max(sizes[~is_wrap], initial=0.0))
+        if np.min(sizes[is_wrap]) - largest < period / 4:
+            continue
+        if np.all(np.abs(period - sizes[is_wrap]) <= 3 * max(usual, largest)):
             unwrapped = values.copy()
             unwrapped[seen] = np.unwrap(values[seen], period=period)
             return unwrapped, period, seen[1:][is_wrap]

@@ -24,6 +24,8 @@ LARGEST_UNCERTAINTY = 0.1
 LEAST_STROKES = 4
 """Times that the tip reverses, which is each time after the slack was crossed."""
 SURROGATES, LARGEST_P = 199, 0.01
+NEGLIGIBLE = 0.03
+"""Largest slack that would not have been seen, as a share of the tip's range."""
 LEAST_ADVANTAGE = 1.05
 """Error of a lag without slack, over that of the model."""
 _LARGEST = 0.49
@@ -99,9 +101,15 @@ class Identification:
         if self.is_at_limit:
             return "the best fit is at the limit of the search"
         if not self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
-            limits = f"{self.width.low:.3g} to {self.width.high:.3g}".replace("inf", "any width")
-            return f"its interval, {limits}, is wider than ± {100 * LARGEST_UNCERTAINTY:.0f} %"
+            limits = f"{self.width.low:.3g} and {self.width.high:.3g}".replace("inf", "any width")
+            largest = f"{100 * LARGEST_UNCERTAINTY:.0f} %"
+            return f"it is between {limits} (95 % interval), and not known to ± {largest}"
         return ""
+
+    @property
+    def is_related(self) -> bool:
+        """Whether the command explains the tip, over strokes enough to say so."""
+        return self.strokes >= LEAST_STROKES and self.p_value <= LARGEST_P
 
     @property
     def half_widths(self) -> Floats:
@@ -118,10 +126,10 @@ class Identification:
         """Whether the tip follows the command, and a slack would have been seen."""
         return (
             not self.is_identified
-            and self.p_value <= LARGEST_P
-            and self.strokes >= LEAST_STROKES
+            and self.is_related
             and not self.is_at_limit
-            and self.width.high <= 2 * self.noise + 0.02 * float(np.ptp(self.predicted))
+            and self.width.value <= 2 * self.width.half
+            and self.width.high <= NEGLIGIBLE * float(np.ptp(self.predicted - self.drift))
         )
 
 

@@ -39,7 +39,7 @@ def slide(verdict: Verdict) -> Figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.15, 1))
         _draw_loop(left, verdict, shown)
         _draw_time(right, verdict, shown)
-        figure.suptitle(textwrap.fill(_headline(verdict), 92), x=0.02, ha="left", weight="bold")
+        figure.suptitle(textwrap.fill(_headline(verdict), 76), x=0.02, ha="left", weight="bold")
     return figure
 
 
@@ -113,7 +113,7 @@ def _draw_time(axes: Axes, verdict: Verdict, shown: slice) -> None:
     measured = record.measured[shown]
     seen = np.isfinite(measured)
     axes.plot(*_thinned(at[seen], measured[seen]), color=GREY, linewidth=3, label="measured")
-    if found.is_identified or found.is_aligned:
+    if found.is_related:
         predicted = _thinned(at, found.predicted[shown])
         axes.plot(*predicted, color=BLUE, linewidth=1.2, label="predicted")
     axes.set_xlabel("time [s]" if record.is_timed else "sample")

@@ -13,11 +13,14 @@ from tautscope.analysis.compensation import Compensation, simulate
 from tautscope.analysis.compensator import compensator, late_by
 from tautscope.analysis.findings import (
     Finding,
+    curve_finding,
     gain_finding,
     identify_without_repeats,
     without_errors,
 )
 from tautscope.analysis.identification import (
+    LARGEST_UNCERTAINTY,
+    LEAST_ADVANTAGE,
     LEAST_STROKES,
     Identification,
     Interval,
@@ -27,6 +30,8 @@ from tautscope.runs.records import Record
 
 PARSIMONY = 1.05
 """A simpler explanation is as good if it leaves this factor of the error at most."""
+MOST_STROKES = 10
+"""Times the strokes of a record that a person can be asked for."""
 ROUNDING = 1e-6
 """Smaller errors, over the extent of the tip, are those of the fit: the record is exact."""
 
@@ -73,7 +78,7 @@ class Verdict:
             ]
         else:
             parts = [f"The slack is not identified, and there are no settings: {found.missing}."]
-        if found.is_identified or found.is_aligned:
+        if found.is_related:
             parts += [self._relation(), self._explanation()]
         if self.compensation is not None:
             before, after = self.compensation.before, self.compensation.after
@@ -91,7 +96,8 @@ class Verdict:
 
     def to_json(self) -> dict[str, Any]:
         """The entry of a degree of freedom in ``tautscope analyze --json``."""
-        found, is_known = self.found, self.found.is_identified or self.found.is_aligned
+        found = self.found
+        is_known = found.is_related and math.isfinite(found.width.high)
         width = found.width.value if found.is_identified else 0.0 if found.is_aligned else None
         return {
             "name": self.name,
@@ -164,19 +170,36 @@ class Verdict:
         if found.is_identified:
             return "measure the tip more often, earlier or with less noise, and record again"
         if found.is_aligned:
-            stamps = f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
-            return stamps if self._is_late else "command the motor directly"
+            if self._is_late:
+                return f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
+            return "command the motor directly; the error that remains is not slack"
+        return self._record_next()
+
+    def _record_next(self) -> str:
+        """What to record, if nothing is identified."""
+        found = self.found
         if found.strokes < LEAST_STROKES:
             return (
                 "record at least ten strokes, back and forth, each several times as long as "
                 "the slack"
             )
+        if not found.is_related:
+            return (
+                "check that the two columns belong together, then record strokes several times "
+                "as long as the slack"
+            )
+        if found.explanations["a lag"] < LEAST_ADVANTAGE * found.noise:
+            return (
+                "record the same strokes at half the speed: a lag shrinks with it, slack does not"
+            )
         if found.is_at_limit or not math.isfinite(found.width.high):
             return "record longer and slower strokes"
-        return (
-            "check that the two columns belong together, then record more and longer strokes "
-            "at two speeds"
-        )
+        excess = found.width.half / (LARGEST_UNCERTAINTY * max(found.width.value, 1e-300))
+        count = math.ceil(excess**2 * found.strokes)
+        often = f"about {count} strokes in place of {found.strokes}"
+        if excess**2 > MOST_STROKES:
+            often = "many more strokes, with all else at rest (other axes, endoscope, sensor)"
+        return f"record {often}, each several times as long as the slack, at two speeds"
 
 
 def judge(
@@ -201,8 +224,9 @@ def judge(
         drift, extent = float(np.ptp(found.drift)), float(np.ptp(found.predicted))
         if drift > max(3 * found.noise, 0.03 * extent):
             findings.append(Finding("tip", f"it drifts by {drift:.3g} over the record"))
-        if (units := gain_finding(record, found.gain)) is not None:
-            findings.append(units)
+    if found.is_related:
+        more = gain_finding(record, found.gain), curve_finding(record, found)
+        findings += [each for each in more if each is not None]
     is_used = found.is_identified
     return Verdict(
         name,
@@ -219,7 +243,7 @@ def plus_minus(interval: Interval) -> str:
     """A value with half its interval, both with two digits of the half."""
     half = interval.half
     if not math.isfinite(half):
-        return f"{interval.value:.3g} (unknown interval)"
+        return f"{interval.value:.3g} ± ?"
     size = max(half, 1e-3 * abs(interval.value), 1e-12)
     places = 1 - math.floor(math.log10(size))
     shown = max(places, 0)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
-
-import cv2
-import numpy as np
+from typing import Any, TypeGuard
 
 from tautscope.calibration.camera.intrinsics import Intrinsics, Model
 from tautscope.errors import FieldError, MissingPathError
@@ -18,6 +15,8 @@ _MODELS: dict[str, tuple[Model, tuple[int, ...]]] = {
     "equidistant": ("fisheye", (4,)),
 }
 """ROS's distortion model -> ours, and the allowed numbers of coefficients."""
+_SKEW = 5e-3
+"""Largest skew of a fisheye lens, as a share of its focal length: a pixel at the edge."""
 
 
 def camera_info(camera: Intrinsics, name: str = "camera") -> str:
@@ -44,7 +43,9 @@ def camera_info(camera: Intrinsics, name: str = "camera") -> str:
 
 
 def read_camera_info(path: Path) -> Intrinsics:
-    """Read a camera_info file of an unrectified camera.
+    """Read a camera_info file of an unrectified camera, or what `ros2 topic echo` prints of one.
+
+    A small skew of a fisheye lens, as OpenCV fits it, is left out.
 
     Raises:
         MissingPathError: The file does not exist.
@@ -52,34 +53,52 @@ def read_camera_info(path: Path) -> Intrinsics:
     """
     if not path.is_file():
         raise MissingPathError("camera_info", str(path), "a ROS camera_info file (YAML)")
-    text = path.read_text(encoding="utf-8", errors="replace")
-    # OpenCV's parser needs its own first line.
-    body = re.sub(r"\A(%YAML[^\n]*\n)?(---[^\n]*\n)?", "", text)
-    try:
-        storage = cv2.FileStorage(
-            f"%YAML:1.0\n---\n{body}", cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
-        )
-    except (cv2.error, SystemError):
-        raise FieldError("camera_info", str(path), "YAML as of ROS's camera_calibration") from None
-    width, height = (_number(path, storage, f"image_{side}") for side in ("width", "height"))
-    matrix = _numbers(path, storage, "camera_matrix")
+    document = _document(path)
+    width, height = (_number(path, document, f"image_{side}", side) for side in ("width", "height"))
+    matrix = _numbers(path, document, "camera_matrix", "k")
     if len(matrix) != 9:
         raise FieldError(f"{path}: camera_matrix", len(matrix), "9 numbers")
-    name = str(storage.getNode("distortion_model").string())
-    coefficients = _numbers(path, storage, "distortion_coefficients")
+    name = str(document.get("distortion_model"))
+    coefficients = _numbers(path, document, "distortion_coefficients", "d")
     if name not in _MODELS:
         allowed = "one of " + ", ".join(_MODELS)
         raise FieldError(f"{path}: distortion_model", name, allowed)
     model, counts = _MODELS[name]
+    while len(coefficients) > counts[-1] and coefficients[-1] == 0:
+        coefficients.pop()
     if len(coefficients) not in counts:
         allowed = " or ".join(map(str, counts)) + " numbers"
         raise FieldError(f"{path}: distortion_coefficients", len(coefficients), allowed)
     if model == "pinhole" and len(coefficients) == 4:
         coefficients = [*coefficients, 0.0]
     fx, skew, cx, _, fy, cy = matrix[:6]
-    if skew or not (fx > 0 and fy > 0):
+    if abs(skew) > (_SKEW * fx if model == "fisheye" else 0) or not (fx > 0 and fy > 0):
         raise FieldError(f"{path}: camera_matrix", matrix, "focal lengths above 0 and no skew")
     return Intrinsics((int(width), int(height)), model, (fx, fy), (cx, cy), tuple(coefficients))
+
+
+def _document(path: Path) -> dict[str, Any]:
+    """The first document of a YAML file, with small letters in its keys."""
+    from ruamel.yaml import YAML  # noqa: PLC0415  only files of others need it
+    from ruamel.yaml.error import YAMLError  # noqa: PLC0415
+
+    text = path.read_text(encoding="utf-8", errors="replace")
+    expected = "YAML as of ROS's camera_calibration"
+    if text.lstrip().startswith("<") or "!!opencv-matrix" in text:
+        raise FieldError(
+            "camera_info", f"a file of OpenCV, {path}", f"{expected}: copy its numbers"
+        )
+    try:
+        documents = YAML(typ="safe", pure=True).load_all(text)
+        found: object = next((each for each in documents if each is not None), {})
+    except (YAMLError, ValueError, RecursionError):
+        raise FieldError("camera_info", str(path), expected) from None
+    if not isinstance(found, dict):
+        raise FieldError("camera_info", str(path), expected)
+    if any(isinstance(each, dict) and "intrinsics" in each for each in found.values()):
+        copied = f"{expected}: copy intrinsics (fx, fy, cx, cy) and distortion_coeffs"
+        raise FieldError("camera_info", f"a file of Kalibr, {path}", copied)
+    return {str(name).lower(): value for name, value in found.items()}
 
 
 def _matrix(name: str, rows: int, columns: int, values: Sequence[float]) -> str:
@@ -87,17 +106,21 @@ def _matrix(name: str, rows: int, columns: int, values: Sequence[float]) -> str:
     return f"{name}:\n  rows: {rows}\n  cols: {columns}\n  data: [{data}]\n"
 
 
-def _number(path: Path, storage: cv2.FileStorage, name: str) -> float:
-    node = storage.getNode(name)
-    if not (node.isInt() or node.isReal()) or not node.real() >= 1:
-        raise FieldError(f"{path}: {name}", None, "a number above 0")
-    return float(node.real())
+def _number(path: Path, document: dict[str, Any], *names: str) -> float:
+    value = next((document[name] for name in names if name in document), None)
+    if not _is_number(value) or not value >= 1:
+        raise FieldError(f"{path}: {names[0]}", value, "a number above 0")
+    return float(value)
 
 
-def _numbers(path: Path, storage: cv2.FileStorage, name: str) -> list[float]:
-    data = storage.getNode(name).getNode("data")
-    items = [data.at(k) for k in range(data.size())] if data.isSeq() else []
-    values = [float(item.real()) for item in items if item.isInt() or item.isReal()]
-    if not values or len(values) != len(items) or not np.isfinite(values).all():
-        raise FieldError(f"{path}: {name}.data", None, "a list of finite numbers")
-    return values
+def _numbers(path: Path, document: dict[str, Any], *names: str) -> list[float]:
+    """Numbers of a matrix with rows, cols and data, or of a list."""
+    value = next((document[name] for name in names if name in document), None)
+    data = value.get("data") if isinstance(value, dict) else value
+    if not isinstance(data, list) or not data or not all(map(_is_number, data)):
+        raise FieldError(f"{path}: {names[0]}.data", None, "a list of finite numbers")
+    return [float(each) for each in data]
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e100

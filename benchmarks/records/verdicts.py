@@ -1,0 +1,123 @@
+"""Verdicts on all real records, beside those of a person who has read them and seen the figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from records import continuum, tools
+from records.honest import SAYS
+from tautscope.analysis.slide import slide
+from tautscope.analysis.verdict import Verdict, judge
+from tautscope.runs.records import Cleaning, Record
+
+JUDGEMENTS = {
+    "tool4_L4_run00": (
+        "unknown",
+        "right: four strokes, of which the first ends 2° lower. The verdict does not name this",
+    ),
+    "tool4_L4_run14": ("slack", "right: the width of the loop in the figure"),
+    "tool4_L4_run23": ("slack", "right, as run14"),
+    "tool4_L4_run41": ("slack", "right; rounded ends"),
+    "tool4_R5_run10": ("slack", "right: sharp corners, the widest loop"),
+    "tool4_pitch2_run000": (
+        "slack",
+        "right for these strokes; of the loop, 3°, 0.8° are called a delay, at one speed",
+    ),
+    "tool4_roll1_run000": (
+        "unknown",
+        "right, but timid: a loop of 3°, half of which is called a delay; two speeds are needed",
+    ),
+    "tool4_roll3_run000": ("unknown", "right, but timid: as roll1"),
+    "tool4_roll5_run000": ("slack", "right; the upper end is rounder than the lower one"),
+    "continuum seg1, axis 1": ("no slack", "right: a line, slightly bent, which is named"),
+    "continuum seg1, axis 2": ("unknown", "right: the other axis moves the tip by more than slack"),
+    "continuum seg2, axis 1": ("no slack", "right: a line"),
+    "continuum seg2, axis 2": ("unknown", "right, as seg1, axis 2"),
+    "continuum seg3, axis 1": ("unknown", "right: loops to both sides, from the other axis"),
+    "continuum seg3, axis 2": ("unknown", "right: loops of all sizes, few strokes"),
+    "continuum pair12 same, axis 1": (
+        "unknown",
+        "right: the line bends at both ends, which is named",
+    ),
+    "continuum pair12 same, axis 2": (
+        "no slack",
+        "right for slack; the tip turns back at the end of a stroke, by 40 mm: the other axis",
+    ),
+    "continuum pair12 opp, axis 1": ("unknown", "right: loops of 10 mm, from coupling or slack"),
+    "continuum pair12 opp, axis 2": ("unknown", "right, as axis 1"),
+    "continuum pair13 same, axis 1": ("unknown", "right: a fan, from the other axis"),
+    "continuum pair13 same, axis 2": ("unknown", "right: two lines, from the other axis"),
+    "continuum pair13 opp, axis 1": (
+        "unknown",
+        "right at one speed, but timid: a person would suspect a slack of 5 mm",
+    ),
+    "continuum pair13 opp, axis 2": ("unknown", "right, as axis 1"),
+    "continuum pair23 same, axis 1": ("unknown", "right: an S, which is named"),
+    "continuum pair23 same, axis 2": ("unknown", "right: an S, which is named"),
+    "continuum pair23 opp, axis 1": ("unknown", "right: the tip moves while this axis rests"),
+    "continuum pair23 opp, axis 2": ("unknown", "right: the gain differs between both sides"),
+}
+"""By record: what the verdict said when it was read, and the judgement of the reader."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A verdict in short.
+
+    Attributes:
+        says: One of `SAYS`.
+        slack: Width with its interval, its limit, or the reason why there is none.
+        effect: RMS error of the tip without and with the loop.
+        text: The verdict.
+    """
+
+    says: str
+    slack: str
+    effect: str
+    text: str
+
+
+def names() -> list[str]:
+    """Tools, and axes of the continuum robot."""
+    return [*tools.tools(), *continuum.robots()]
+
+
+def read(name: str) -> Record:
+    """A real record, with its units."""
+    source, unit = (continuum, "mm") if name in continuum.RECORDS else (tools, "deg")
+    command, measured = source.read(name)
+    return Record(command, measured, None, np.arange(len(command)), Cleaning(), units=(unit, unit))
+
+
+def evaluate(job: tuple[str, Path | None]) -> Answer:
+    """Judge a record, and draw its figure into a folder if there is one."""
+    name, folder = job
+    verdict = judge(read(name))
+    if folder is not None:
+        slide(verdict).savefig(folder / f"{name}.png", dpi=100)
+    return _answer(verdict)
+
+
+def _answer(verdict: Verdict) -> Answer:
+    found, unit, effect = verdict.found, verdict.record.units[1], ""
+    if verdict.compensation is not None:
+        effect = f"{verdict.compensation.before:.3g}, {verdict.compensation.after:.3g}"
+    if found.is_identified:
+        return Answer("slack", verdict.width, effect, verdict.text)
+    if found.is_aligned:
+        return Answer("no slack", f"at most {found.width.high:.3g} {unit}", effect, verdict.text)
+    return Answer("unknown", found.missing, effect, verdict.text)
+
+
+def table(found: dict[str, Answer]) -> str:
+    """Markdown: a row per record."""
+    lines = ["| record | says | slack | RMS now, with it | judgement |", "|---|---|---|--:|---|"]
+    for name, each in found.items():
+        said, judgement = JUDGEMENTS.get(name, ("", ""))
+        text = judgement if said == each.says else "**to be read**: the verdict has changed"
+        lines.append(f"| {name} | {each.says} | {each.slack} | {each.effect} | {text} |")
+    counts = (f"{sum(each.says == says for each in found.values())} {says}" for says in SAYS)
+    listed = ", ".join(counts)
+    return "\n".join([*lines, "", f"{len(found)} records: {listed}."])
