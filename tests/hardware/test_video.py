@@ -54,7 +54,7 @@ def test_pixel_formats_have_the_same_colours(name: str) -> None:
     """Green, as BT.601 with limited range has it."""
     config = camera("color=0x30c040:size=64x48:rate=25,format=yuv420p", pixel_format=name)
     with open_source(config.source.url, "lavfi") as container:
-        image = next(iter(Decoder(container, config, live=True))).image
+        image = next(iter(Decoder(container, config))).image
     y, u, v = (
         16
         + np.array(

@@ -10,7 +10,7 @@ from tautscope.config.fields import Positive, Vector3
 from tautscope.config.section import Section
 
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
-Deinterlace = Literal["bwdif", "none"]
+Deinterlace = Literal["bwdif", "always", "none"]
 CameraClock = Literal["stream", "device", "arrival"]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
@@ -35,7 +35,8 @@ class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     options: dict[str, str] = field(default_factory=dict)
     """FFmpeg's options of the format: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"
-    """Deinterlacing: ``bwdif`` makes each field a frame, with a delay of one frame."""
+    """Deinterlacing: ``bwdif`` makes each field a frame, with a delay of one frame; ``always`` also
+    where the source does not say that it is interlaced."""
     clock: CameraClock = "stream"
     """Capture time of a frame: ``stream``, its time stamp, mapped to our clock by the frame with
     the lowest latency in `clock_window`; ``device``, its time stamp on the system's monotonic clock

@@ -48,6 +48,7 @@ class CameraState:
         received: Frames received; fields of an interlaced source.
         lost: Frames missing according to the time stamps.
         skipped: Frames replaced by a newer one before they were taken.
+        damaged: Frames that could not be decoded whole since the source was opened.
         reconnects: How often the source was opened again.
         is_interlaced: Whether the source is interlaced; None before the first frame.
         age: Time since the last arrival [s]; infinite before the first.
@@ -57,6 +58,7 @@ class CameraState:
     received: int = 0
     lost: int = 0
     skipped: int = 0
+    damaged: int = 0
     reconnects: int = 0
     is_interlaced: bool | None = None
     age: float = float("inf")
@@ -148,7 +150,7 @@ class Camera:
             try:
                 options = _LIVE | source.options
                 with open_source(source.url, source.format, options, source.timeout) as container:
-                    self._read(Decoder(container, self._config, live=True))
+                    self._read(Decoder(container, self._config))
                 trouble = f"{source.url} has ended and is opened again"
             except CameraError as error:
                 self._error, trouble = error, str(error)
@@ -183,6 +185,7 @@ class Camera:
                     received=state.received + 1,
                     lost=state.lost + lost,
                     skipped=state.skipped + (self._newest is not None),
+                    damaged=decoder.damaged,
                     is_interlaced=decoder.is_interlaced,
                     trouble="",
                 )

@@ -5,6 +5,7 @@ OpenCV's reader is not used: it decodes interlaced DV to black images without an
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from av.filter import Graph
     from av.video.stream import VideoStream
 
+_LOG = logging.getLogger(__name__)
+
 Image = NDArray[np.uint8]
 
 _FORMATS = {
@@ -38,6 +41,15 @@ _FORMATS = {
     "i420": "yuv420p",
 }
 """`camera.pixel_format` -> FFmpeg's name."""
+_NO_STAMPS = 0x80
+"""FFmpeg's AVFMT_NOTIMESTAMPS: the format has none, and they are counted from a nominal rate."""
+_TURNS = {
+    0: (),
+    90: (("transpose", "cclock"),),
+    -90: (("transpose", "clock"),),
+    180: (("hflip", ""), ("vflip", "")),
+}
+"""Angle by which a player turns the frames, counterclockwise -> FFmpeg's filters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,21 +122,25 @@ def open_video_file(path: str) -> Iterator[InputContainer]:
 class Decoder:
     """Decodes the video of an open source into images of the configured size and format.
 
+    Frames are turned as the source says. A damaged one is left out: FFmpeg would fill its gaps.
+
     Args:
         container: From `open_source`.
         camera: Its size, pixel format and ``source.deinterlace`` are used.
-        live: Minimise latency; otherwise maximise throughput.
 
     Attributes:
         is_interlaced: Whether the source is interlaced; None before the first frame.
+        damaged: Number of frames that were left out.
     """
 
-    def __init__(self, container: InputContainer, camera: CameraConfig, *, live: bool) -> None:
+    def __init__(self, container: InputContainer, camera: CameraConfig) -> None:
         self.is_interlaced: bool | None = None
+        self.damaged = 0
         self._container = container
         self._stream: VideoStream = container.streams.video[0]
-        # Frame threading delays the output by one frame per thread.
-        self._stream.thread_type = "SLICE" if live else "AUTO"
+        # Frame threading delays the output by one frame per thread, and loses those after an error.
+        self._stream.thread_type = "SLICE"
+        self._stream.codec_context.options = {"err_detect": "explode"}
         self._camera = camera
         self._shape = FrameLayout(camera).shape
         self._graph: Graph | None = None
@@ -135,7 +151,7 @@ class Decoder:
         rate = self._stream.average_rate or self._stream.guessed_rate
         if not rate:
             return None
-        return 1 / float(rate) / (2 if self._graph is not None else 1)
+        return 1 / float(rate) / (2 if self._has_fields else 1)
 
     def __iter__(self) -> Iterator[DecodedFrame]:
         """Decode all frames until the source ends.
@@ -143,20 +159,36 @@ class Decoder:
         Raises:
             CameraMismatchError: A frame does not have the configured size.
         """
-        for frame in self._container.decode(self._stream):
-            yield from self._decode(frame)
+        from av.error import InvalidDataError  # noqa: PLC0415  takes 0.1 s
+
+        for packet in self._container.demux(self._stream):
+            try:
+                frames = packet.decode()
+            except InvalidDataError:
+                self.damaged += 1
+                continue
+            for frame in frames:
+                yield from self._decode(frame)
         if self._graph is not None:
             self._graph.push(None)
             yield from self._fields(self._graph)
 
+    @property
+    def _has_fields(self) -> bool:
+        """Whether each field becomes a frame."""
+        choice = self._camera.source.deinterlace
+        return choice == "always" or (choice == "bwdif" and bool(self.is_interlaced))
+
     def _decode(self, frame: av.VideoFrame) -> Iterator[DecodedFrame]:
         self.is_interlaced = bool(self.is_interlaced or frame.interlaced_frame)
-        self._check_size(frame)
-        if not self.is_interlaced or self._camera.source.deinterlace == "none":
+        turns = _TURNS[(frame.rotation + 179) % 360 - 179]
+        if not self._has_fields and not turns:
             yield self._convert(frame)
             return
         if self._graph is None:
-            self._graph = _deinterlacer(self._stream)
+            deint = "all" if self._camera.source.deinterlace == "always" else "interlaced"
+            fields = (("bwdif", f"mode=send_field:deint={deint}"),) if self._has_fields else ()
+            self._graph = _graph(self._stream, (*fields, *turns))
         self._graph.push(frame)
         yield from self._fields(self._graph)
 
@@ -171,6 +203,7 @@ class Decoder:
             yield self._convert(field)  # type: ignore[arg-type]  # a video graph gives video
 
     def _convert(self, frame: av.VideoFrame) -> DecodedFrame:
+        self._check_size(frame)
         return DecodedFrame(
             _pixels(frame, _FORMATS[self._camera.pixel_format], self._shape), frame.time
         )
@@ -196,28 +229,39 @@ def read_video(path: str, camera: CameraConfig, start: float = 0.0) -> Iterator[
 
     Raises:
         MissingPathError: The file does not exist.
-        CameraError: It is no video, has another size, or a frame has no time stamp.
+        CameraError: It is no video, has another size, or its frames have no time stamps.
     """
     with open_video_file(path) as container:
+        if container.format.flags & _NO_STAMPS:
+            raise CameraError(
+                "video",
+                f"{path}, a raw stream ({container.format.name}) whose frames have no time stamps",
+                "a container with them; if no frame was dropped at, say, 25 per second, "
+                f"ffmpeg -r 25 -i {path} -c copy clip.mkv makes one",
+            )
         first: float | None = None
-        for sequence, decoded in enumerate(Decoder(container, camera, live=False)):
+        decoder = Decoder(container, camera)
+        for sequence, decoded in enumerate(decoder):
             if decoded.stamp is None:
                 raise CameraError(
                     "video", f"frame {sequence} without a time stamp", "a time stamp per frame"
                 )
             first = decoded.stamp if first is None else first
             yield Frame(decoded.image, start + decoded.stamp - first, sequence)
+        if decoder.damaged:
+            _LOG.warning("%s: %d damaged frames were left out", path, decoder.damaged)
 
 
-def _deinterlacer(stream: VideoStream) -> Graph:
+def _graph(stream: VideoStream, filters: tuple[tuple[str, str], ...]) -> Graph:
+    """FFmpeg's filters, one after the other: names and arguments."""
     from av.filter import Graph  # noqa: PLC0415
 
     graph = Graph()
-    source = graph.add_buffer(template=stream)
-    fields = graph.add("bwdif", "mode=send_field:deint=interlaced")
-    sink = graph.add("buffersink")
-    source.link_to(fields)
-    fields.link_to(sink)
+    last = graph.add_buffer(template=stream)
+    for name, arguments in (*filters, ("buffersink", "")):
+        following = graph.add(name, arguments or None)
+        last.link_to(following)
+        last = following
     graph.configure()
     return graph
 

@@ -101,10 +101,11 @@ def _check_captures(
         "age": age,
         "received": state.received,
         "lost": state.lost,
+        "damaged": state.damaged,
     }
-    if state.lost:
+    if state.lost or state.damaged:
         todo = "Check whether cable, hub or processor is too slow; end other programs"
-        lost = f"{state.lost} frame{'s' if state.lost > 1 else ''} lost"
+        lost = f"frames lost: {state.lost}, of them damaged: {state.damaged}"
         return CheckResult("camera", what, "note", f"{found}; {lost}", todo, data)
     return CheckResult("camera", what, "ok", found, data=data)
 
