@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench.commissioning import calibrate, check
 from bench.processes import bench_config, run, start_rig
 from numpy.typing import ArrayLike
 from tautscope.bench.ground_truth import read_ground_truth
@@ -70,13 +71,15 @@ def with_truth(folder: Path, suffix: str, truth: Path) -> Recording:
 
 
 def compare(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
-    """Run the protocol on the bench and in the in-process twin."""
+    """Commission a rig on the bench, run the protocol on it and in the in-process twin."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         config = bench_config(folder, arguments)
         truth, run_folder = folder / "truth.csv", out or folder / "run"
         with start_rig(config, folder, "--truth", str(truth)):
-            process = run(folder / "rig.toml", run_folder, "--compare")
+            file = folder / "rig.toml"
+            document: dict[str, Any] = {"missing": check(file)} | calibrate(file, config)
+            process = run(file, run_folder, "--compare")
             text, errors = process.communicate()
         if process.returncode:
             raise RuntimeError(errors)
@@ -88,8 +91,7 @@ def compare(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
     twin = evaluate(
         *(run_experiment(rig, reference, config, compensate) for compensate in (False, True))
     )
-    document: dict[str, Any] = {"run": json.loads(text)["runs"], "reductions": {}}
-    document["replays"] = replays
+    document |= {"run": json.loads(text)["runs"], "replays": replays, "reductions": {}}
     for dof in Dof:
         ours, theirs = bench[dof].reduction, twin[dof].reduction
         document["reductions"][dof.label] = {

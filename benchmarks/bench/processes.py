@@ -9,12 +9,11 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from common.paths import ROOT
 from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof
 
-BENCH = ROOT / "configs" / "bench.toml"
 TIMEOUT = 60.0
 """Time within which a process must end [s]."""
 TAUTSCOPE = [sys.executable, "-c", "from tautscope.cli import main; raise SystemExit(main())"]
@@ -23,14 +22,17 @@ TAUTSCOPE = [sys.executable, "-c", "from tautscope.cli import main; raise System
 def bench_config(folder: Path, arguments: Namespace) -> Config:
     """Return the configuration of the bench with its sockets in a folder."""
     changes = {
-        "drives.channel": str(folder / "can"),
+        "drives.channel": str(folder / "bus"),
         "camera.source.url": f"unix:{folder / 'video'}",
         "twin.seed": arguments.seed,
         "profile": arguments.profile,
         "experiment.periods": arguments.periods,
     }
-    changes |= {f"experiment.{dof.label}.period": arguments.period for dof in Dof}
-    return load_config(BENCH).replace(**changes)
+    if arguments.heartbeat_timeout is not None:
+        changes["drives.heartbeat_timeout"] = arguments.heartbeat_timeout
+    if arguments.period is not None:
+        changes |= {f"experiment.{dof.label}.period": arguments.period for dof in Dof}
+    return load_config(arguments.config).replace(**changes)
 
 
 class Rig:
@@ -82,6 +84,16 @@ def start_rig(config: Config, folder: Path, *more: str) -> Iterator[Rig]:
             yield found
         finally:
             process.communicate(timeout=TIMEOUT)
+
+
+def call(*words: str | Path, statuses: tuple[int, ...] = (0,)) -> Any:
+    """Carry out a command with ``--json`` that ends with one of the statuses; what it prints."""
+    done = subprocess.run(
+        [*TAUTSCOPE, *map(str, words), "--json"], capture_output=True, text=True, check=False
+    )
+    if done.returncode not in statuses:
+        raise RuntimeError(f"{' '.join(map(str, words))}: {done.stdout} {done.stderr}")
+    return json.loads(done.stdout)
 
 
 def run(file: Path, out: Path, *more: str) -> subprocess.Popen[str]:

@@ -14,10 +14,28 @@ ROWS = {
 
 def tables(document: dict[str, Any]) -> Iterator[str]:
     """Yield the lines of all tables."""
+    yield from _commissioning(document)
     yield from _punctuality(document.get("run", {}))
     yield from _replays(document.get("replays", {}))
     yield from _reductions(document.get("reductions", {}))
     yield from _stops([*document.get("faults", []), *document.get("wrong", [])])
+
+
+def _commissioning(document: dict[str, Any]) -> Iterator[str]:
+    """Yield what was found before the first run."""
+    if "missing" in document:
+        yield f"\ndoctor: {', '.join(document['missing']) or 'All there'}"
+    for stop in document.get("stops", []):
+        yield f"stop of insertion: {1e3 * stop['found']:.2f} mm, true {1e3 * stop['true']:.2f} mm"
+    if found := document.get("geometry"):
+        yield f"geometry: residual {found['residual']:.2g} px"
+    for row in document.get("owners", []):
+        missing = ", ".join(row["missing"]) or "All there"
+        yield (
+            f"\n{row['drives']}: {row['minutes']:.1f} min; doctor: {missing}; jog by 1 mm: "
+            f"{1e3 * row['moved']:.2f} mm; {', '.join(row['done'])}; {row['said'] or 'no error'}"
+        )
+        yield from (f"- {note}" for note in row["motion"])
 
 
 def _punctuality(runs: dict[str, Any]) -> Iterator[str]:
@@ -68,11 +86,9 @@ def _stops(rows: list[dict[str, Any]]) -> Iterator[str]:
     """Yield what failed, how soon the run ended, and its message."""
     if not rows:
         return
-    yield "\n| failure | time | goal | exit status | message |\n|---|---|---|---|---|"
+    yield "\n| failure | time | as it must | exit status | message |\n|---|---|---|---|---|"
     for row in rows:
         took = "" if row["ms"] is None else f"{row['ms']:.3g} ms"
         status = "" if row["status"] is None else row["status"]
-        limit = row.get("limit_ms")
-        goal = "" if limit is None else f"{limit:g} ms"
-        goal += "" if row.get("holds", True) else " missed"
-        yield f"| {row['what']} | {took} | {goal} | {status} | {row['said']} |"
+        holds = "yes" if row.get("holds", True) else "no"
+        yield f"| {row['what']} | {took} | {holds} | {status} | {row['said']} |"

@@ -6,6 +6,11 @@ from typing import Any
 
 from tautscope.config import DrivesConfig, from_document
 
+EXPERIMENT = {
+    "rotation": {"centre": 0.0, "amplitude": 1.5},
+    "bending": {"centre": 0.9, "amplitude": 0.3},
+}
+"""Within the travel of `AXES`, with the slack."""
 AXES = {
     "insertion": {
         "node": 1,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
-from drive_settings import drives_document
+from drive_settings import EXPERIMENT, drives_document
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, from_document
 from tautscope.hardware.cameras import CameraState, Capture
@@ -99,5 +99,6 @@ def rig_config(
             "control": {"period": period},
             "drives": drives_document(**(defaults | (drives or {}))),
             "camera": {"source": patient | (source or {})},
+            "experiment": EXPERIMENT,
         }
     )

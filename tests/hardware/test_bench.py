@@ -53,7 +53,7 @@ def bench_config(folder: Path, **changes: Any) -> Config:
         ),
         "experiment": {
             "periods": 3,
-            "insertion": {"centre": 0.025, "amplitude": 0.004, "period": 1.0},
+            "insertion": {"centre": 0.025, "amplitude": 0.0025, "period": 1.0},
             "rotation": {"centre": 0.0, "amplitude": 0.2, "period": 0.4},
             "bending": {"centre": 0.9, "amplitude": 0.1, "period": 0.4},
         },

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from drive_settings import AXES, drives_document
+from drive_settings import AXES, EXPERIMENT, drives_document
 from tautscope.bench.can_bus import Hub
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.cli import main
@@ -20,7 +20,7 @@ from tautscope.dof import Dof
 from tautscope.hardware.cia402 import State
 from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.doctor.computer import check_disk
-from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.doctor.drives import check_commands, check_drives
 from video_sources import write_dv
 from waiting import TIMEOUT, until
 
@@ -40,7 +40,8 @@ CAMERA = {
 def document(hub: Path, camera: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
     drives = drives_document(channel=str(hub), heartbeat_timeout=1.0, **changes)
     control = {"period": drives["cycle"]}
-    return {"camera": camera or CAMERA, "control": control, "drives": drives}
+    camera = camera or CAMERA
+    return {"camera": camera, "control": control, "drives": drives, "experiment": EXPERIMENT}
 
 
 def drives_of(found: dict[str, Any]) -> DrivesConfig:
@@ -120,6 +121,13 @@ def test_complete_rig(
         )
     assert found["heartbeats and answers"]["data"]["cycles"] > 10
     assert was_never_enabled(drives)
+
+
+def test_too_little_travel_for_the_experiment_is_missing(tmp_path: Path) -> None:
+    config = document(tmp_path)
+    assert check_commands(from_document(config)).status == "ok"
+    found = check_commands(from_document(config | {"experiment": {}}))
+    assert (found.status, found.found) == ("missing", "drives.rotation.travel: (-3.0, 3.5)")
 
 
 def test_motor_in_quick_stop_stays_held(hub: Hub, bench: Bench) -> None:

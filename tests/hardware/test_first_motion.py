@@ -20,6 +20,7 @@ from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.hardware import jog
 from tautscope.hardware.motor_rig import require_drives
+from tautscope.hardware.plausibility import check_experiment
 from tautscope.hardware.scale import Scale
 
 PAGE = (ROOT / "docs" / "hardware.md").read_text(encoding="utf-8")
@@ -37,7 +38,9 @@ def test_each_kind_of_motor_has_a_short_configuration() -> None:
     assert sorted(BLOCKS) == ["canopen", "dynamixel", "feetech", "serial"]
     for block in BLOCKS.values():
         assert len(block.splitlines()) <= 15
-        assert from_document(tomllib.loads(block)).drives is not None
+        config = from_document(tomllib.loads(block))
+        assert config.drives is not None
+        check_experiment(config)  # the first compensated motion fits into travel and speed
 
 
 @pytest.mark.parametrize("protocol", ["dynamixel", "feetech"])

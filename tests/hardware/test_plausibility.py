@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tautscope.config import Config
+from tautscope.config import Config, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.plausibility import PlausibilityMonitor
+from tautscope.hardware.plausibility import PlausibilityMonitor, check_experiment
 
 CONFIG = Config()
 START = np.array([CONFIG.experiment[dof].centre for dof in Dof])
@@ -101,3 +101,29 @@ def test_tip_that_does_not_move(dof: Dof) -> None:
 def test_tip_that_is_never_measured(dof: Dof) -> None:
     with pytest.raises(ConfigError, match=f"drives.{dof.label}: .*no frame measured it"):
         run_sine(dof, play(0.0), is_measured=False)
+
+
+@dofs
+def test_drives_that_cannot_make_the_commands_of_the_experiment_are_refused(dof: Dof) -> None:
+    config = load_config("bench")
+    sine = config.experiment[dof]
+    check_experiment(config)
+    # The compensated motor lags behind and leads by half of the slack, and crosses it K_b times as
+    # fast as the reference.
+    extremes = sine.centre + np.array([-1, 1]) * (sine.amplitude + SLACK[dof] / 2)
+    speed = CONFIG[dof].free_gain * 2 * np.pi * sine.amplitude / sine.period
+    for key, value in {
+        "travel": [float(extremes[0]) + 1e-6, float(extremes[1])],
+        "speed_limit": 0.99 * speed,
+    }.items():
+        with pytest.raises(ConfigError, match=f"{dof.key}.{key}.*experiment"):
+            check_experiment(config.replace(**{f"{dof.key}.{key}": value}))
+
+
+def test_a_rotation_moves_as_fast_as_an_insertion_with_which_it_shares_a_friction() -> None:
+    slow = load_config("bench").replace(**{"drives.rotation.speed_limit": 9.0})
+    # On a rig drawn at random rotation reached 9.09 rad/s while insertion moved.
+    with pytest.raises(ConfigError, match=r"drives\.rotation\.speed_limit.*experiment\.insertion"):
+        check_experiment(slow)
+    check_experiment(slow.replace(**{"experiment.insertion.period": 12.0}))
+    check_experiment(slow.replace(profile="paper"))

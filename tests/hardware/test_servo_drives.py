@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +26,7 @@ from tautscope.errors import (
 )
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.hardware.drives import Drives, open_drives
+from tautscope.hardware.servos.line import NoAnswerError, ServoLine
 from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
@@ -171,8 +171,8 @@ def test_killed_host(protocol: str, tmp_path: Path) -> None:
 def test_unplugged_port_is_a_bus_error(protocol: str, tmp_path: Path) -> None:
     with running(servos_config(protocol, tmp_path, state_timeout=0.2)) as (servos, drives):
         drive(drives, 3)
-        os.dup2(os.open(os.devnull, os.O_RDWR), servos._line)  # the other end is closed
-        with pytest.raises((BusError, SilentDriveError)) as found:
+        servos.inject("unplug", Dof.BENDING)
+        with pytest.raises(BusError, match="connection is lost") as found:
             drive(drives, 10_000)
         assert "quick stop is not confirmed" in str(found.value.__notes__)
 
@@ -194,6 +194,23 @@ def test_dynamixel_stops_when_the_host_hangs_and_a_feetech_goes_to_its_last_goal
             until(lambda servos=servos: goals_are_positions(servos))
         # The watchdog is off: the motors are held.
         assert all(one.get(one.family.torque) for one in servos.servos)
+
+
+def test_a_pause_of_the_computer_while_it_waits_for_answers_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = servos_config("feetech", tmp_path, heartbeat_timeout=0.2)
+
+    def paused(*arguments: Any) -> None:
+        time.sleep(2 * config.heartbeat_timeout)
+        raise NoAnswerError("timeout")
+
+    with running(config) as (_, drives):
+        drive(drives, 3)
+        monkeypatch.setattr(ServoLine, "read_all", paused)
+        with pytest.raises(SilentDriveError) as found:
+            drive(drives, 1)
+    assert "This computer paused for" in str(found.value.__notes__)
 
 
 @FAMILIES

@@ -31,8 +31,9 @@ def between_stops(
     def plant(demand: np.ndarray) -> np.ndarray:
         return np.array([np.clip(demand[0], *stops), *demand[1:]])
 
-    assert config.drives is not None
-    with SimulatedServos(config.drives, plant, start=np.array([at, 0.0, 0.5])) as servos:
+    actual = config.replace(**{"drives.insertion.stops": None}).drives
+    assert actual is not None
+    with SimulatedServos(actual, plant, start=np.array([at, 0.0, 0.5])) as servos:
         yield servos
 
 
@@ -75,6 +76,14 @@ def test_stops_of_a_feetech_are_found(tmp_path: Path) -> None:
     with between_stops(config, 0.002, stops=(0.0, 0.004)):
         stops = find_stops(config, Dof.INSERTION, torque=0.5)
     assert (stops.lower, stops.upper) == pytest.approx((0.0, 0.004), abs=2 / 3e5)
+
+
+def test_the_bench_has_the_stops_of_its_configuration(tmp_path: Path) -> None:
+    at = rig("dynamixel", tmp_path, travel=[0.0, 0.04], stops=[-0.001, 0.041], speed_limit=0.5)
+    assert at.drives is not None
+    with SimulatedServos(at.drives, start=np.array([0.02, 0.0, 0.5])):
+        stops = find_stops(at, Dof.INSERTION, torque=0.3)
+    assert (stops.lower, stops.upper) == pytest.approx((-0.001, 0.041), abs=2 * COUNT)
 
 
 def test_without_a_stop_or_with_other_stops_there_is_no_answer(tmp_path: Path) -> None:

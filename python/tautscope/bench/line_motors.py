@@ -33,7 +33,7 @@ _TCGETS2 = 0x802C542A
 
 
 class LineMotors(SimulatedMotors[Kind]):
-    """Motors on one line.
+    """Motors on one line, which the `stops` of their configuration stop.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
@@ -49,6 +49,8 @@ class LineMotors(SimulatedMotors[Kind]):
     ) -> None:
         super().__init__(config, kinds)
         self._on_cycle = on_cycle
+        stops = [config[dof].stops or (-math.inf, math.inf) for dof in config.all_motors]
+        self._lowest, self._highest = np.transpose(stops)
         self._has_goals = False
         self._buffer = bytearray()
         self._answers: list[tuple[float, int, bytes]] = []
@@ -140,6 +142,13 @@ class LineMotors(SimulatedMotors[Kind]):
             self._buffer.clear()
             time.sleep(_IDLE)
 
+    def _unplug(self) -> None:
+        """Take the adapter away: the client's port is gone, the motors go on."""
+        os.close(self._line)
+        self._link.unlink()
+        self._line, end = os.openpty()
+        os.close(end)
+
     def _rate(self) -> int:
         """The bit rate that the client has set [bit/s]."""
         settings = fcntl.ioctl(self._line, _TCGETS2, bytes(44))
@@ -157,5 +166,5 @@ class LineMotors(SimulatedMotors[Kind]):
         if now - self._stepped_at > 1.0:
             self._stepped_at = now
         self._has_goals = False
-        demand = np.array(self._advance(self._config.cycle, now))
+        demand = np.clip(self._advance(self._config.cycle, now), self._lowest, self._highest)
         self._move(demand if self._on_cycle is None else self._on_cycle(demand))

@@ -20,15 +20,18 @@ from tautscope.hardware.scale import Scale
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import FAULTS, Limits, Request, State
 
-FaultKind = Literal["drop", "delay", "fault", "freeze", "restart"]
+FaultKind = Literal["drop", "delay", "fault", "freeze", "restart", "unplug"]
 """drop: the microcontroller neither sends nor receives. delay: it answers late. fault: a motor's
-driver reports one. freeze: a motor is blocked. restart: the microcontroller restarts."""
+driver reports one. freeze: a motor is blocked. restart: the microcontroller restarts.
+unplug: the adapter is gone."""
 _LIMIT = 1 << 30
 _DRIVER = 1
 
 
 class SimulatedMicrocontroller(LineMotors[FaultKind]):
-    """Motors with encoders that count from where they are when it starts.
+    """Motors with encoders that count from where each DOF is at its ``home``.
+
+    After the fault ``restart`` they count from where they are then.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
@@ -54,7 +57,6 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
             scale.to_counts(float(shaft)) for scale, shaft in zip(self._scales, shafts, strict=True)
         ]
         """Where the motors are [counts from home]."""
-        self._zeros = [0] * len(self._scales)
         self._demands = [0.0] * len(self._scales)
         self._blocked: set[Motor] = set()
         speeds = {
@@ -63,12 +65,17 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
         self._limits = [
             Limits(-_LIMIT, _LIMIT, speeds.get(at, 0)) for at in range(max(self._at) + 1)
         ]
-        self._restart()
+        self._switch_on([0] * len(self._scales))
 
-    def _restart(self) -> None:
+    def _switch_on(self, zeros: list[int]) -> None:
         self.board = SerialBoard(self._limits)
-        self._zeros = list(self.shafts)
+        self._zeros = zeros
         self._demands = [float(shaft) for shaft in self.shafts]
+        self._publish()
+
+    def _publish(self) -> None:
+        for at, shaft, zero in zip(self._at, self.shafts, self._zeros, strict=True):
+            self.board.positions[at] = shaft - zero
 
     def _process(self, now: float) -> None:
         before, milliseconds = self.board.state, math.floor(1e3 * now)
@@ -105,7 +112,7 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
         for dof, position in zip(self._config.all_motors, positions, strict=True):
             if dof not in self._blocked:
                 self.shafts[dof] = self._scales[dof].to_counts(float(position))
-            self.board.positions[self._at[dof]] = self.shafts[dof] - self._zeros[dof]
+        self._publish()
 
     def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
         if kind == "fault":
@@ -114,8 +121,10 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
         elif kind == "freeze":
             self._blocked.add(dof)
         elif kind == "restart":
-            self._restart()
+            self._switch_on(list(self.shafts))
             self._logger(dof)(now, "restart")
+        elif kind == "unplug":
+            self._unplug()
 
     def _recover(self, dof: Motor) -> None:
         self._blocked.discard(dof)

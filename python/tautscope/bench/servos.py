@@ -26,9 +26,10 @@ from tautscope.bench.servo_packets import DynamixelPackets, FeetechPackets, Pack
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 
-FaultKind = Literal["drop", "delay", "fault", "freeze", "restart"]
+FaultKind = Literal["drop", "delay", "fault", "freeze", "restart", "unplug"]
 """drop: neither sends nor receives. delay: answers late. fault: overload, without torque. freeze:
-the motor is blocked, which ends in an overload. restart: the power fails for a moment."""
+the motor is blocked, which ends in an overload. restart: the power fails for a moment. unplug: the
+adapter is gone, of all motors."""
 
 
 class SimulatedServos(LineMotors[FaultKind]):
@@ -153,6 +154,8 @@ class SimulatedServos(LineMotors[FaultKind]):
             servo.fail(OVERLOAD, now)
         elif kind == "restart":
             servo.restart(now)
+        elif kind == "unplug":
+            self._unplug()
 
     def _recover(self, dof: Motor) -> None:
         self.servos[dof].is_blocked = False

@@ -31,7 +31,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "time. Ends with its input, Ctrl-C or SIGTERM; in the background, where it has no input, "
         "with a signal only. A line of input injects a fault: KIND PART, with the part insertion, "
         "rotation, bending (drop, delay, fault, freeze; drives also heartbeat, refuse; on a serial "
-        "line also restart) or camera (drop, delay, fault: "
+        "line also restart, unplug) or camera (drop, delay, fault: "
         "unplugged, freeze, board: a calibration board is shown); clear PART ends it. Events are "
         "written as JSON lines.",
         extras=["hardware", "twin"],

@@ -86,6 +86,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         found = f"control.period {config.control.period} s, drives.cycle {config.drives.cycle} s"
         todo = "Make them equal: every tick of the loop sends a set-point"
         yield CheckResult("drives", "pace", "missing", found, todo)
+    yield drives.check_commands(config)
     of_drives = drives.check_drives(config.drives)
     yield from of_drives
     serial_numbers = camera_serial_number(config.camera) | {

@@ -26,7 +26,7 @@ class BusStatistics:
         late: Per motor, cycles that ended before the answer of the drive came.
         lost: Per motor, answers that never came; a pending answer counts until it comes.
         cycles: Set-points sent.
-        longest_pause: Longest time between two cycles [s].
+        longest_pause: Longest time between two cycles, or of the one that failed [s].
     """
 
     late: list[int]
@@ -70,11 +70,15 @@ class DriveMonitor:
 
     def begin_cycle(self) -> None:
         """Count a cycle, and the time since the one before."""
-        now, statistics = time.monotonic(), self.statistics
-        if statistics.cycles:
-            statistics.longest_pause = max(statistics.longest_pause, now - self._last_cycle)
-        self._last_cycle = now
-        statistics.cycles += 1
+        self.note_pause()
+        self._last_cycle = time.monotonic()
+        self.statistics.cycles += 1
+
+    def note_pause(self) -> None:
+        """Count the time since the last cycle began, in which drives may have appeared silent."""
+        if self.statistics.cycles:
+            pause = time.monotonic() - self._last_cycle
+            self.statistics.longest_pause = max(self.statistics.longest_pause, pause)
 
     def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
         """Start from motors that are enabled and at rest; their positions (n,) [m or rad]."""

@@ -255,6 +255,7 @@ class Drives:
             error.add_note(str(failed))
 
     def _stop_after(self, error: BaseException) -> None:
+        self._monitor.note_pause()
         with defer_signals():
             unconfirmed = self._quick_stop()
         if unconfirmed:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tautscope.config import Config
 from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
-from tautscope.hardware.plausibility import PlausibilityMonitor
+from tautscope.hardware.plausibility import PlausibilityMonitor, check_experiment
 from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.run_results import HardwareRun, ProtocolRun
@@ -47,10 +47,13 @@ def run_on_hardware(
         make_rig: Makes the rig.
 
     Raises:
-        ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`.
+        ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`. The drives
+            cannot make the commands; see `check_experiment`.
         TautscopeError: Drives, camera or loop failed.
     """
     kinds = (False, True) if compare else (True,)
+    if reference is None:
+        check_experiment(config)
     rig = make_rig(config)  # an invalid configuration must leave no folder behind
     _make_folder(check_free(folder))
     runs = []

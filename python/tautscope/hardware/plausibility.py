@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -22,6 +23,47 @@ SUFFICIENT_RANGE = 5.0
 """Range of the motor after which a DOF has passed [start deviations]."""
 MAX_GAIN = 3.0
 """Largest ratio of tip motion to motor motion."""
+
+
+SLACK = 0.75
+"""How far the command may have to be from the reference, on either side [expected widths]; 0.73 in
+rotation on the twin."""
+SHARED = (Dof.INSERTION, Dof.ROTATION)
+"""DOFs that share the friction of the shaft."""
+
+
+def check_experiment(config: Config) -> None:
+    """Check that the drives can make the commands of ``[experiment]`` with compensation.
+
+    These are `SLACK` ``expected_width`` beyond the reference, and at most ``free_gain`` times as
+    fast. In profile ``best`` insertion and rotation share that bound, measured in ``width_limit``,
+    as they share a friction: one may move while the reference moves the other.
+
+    Raises:
+        ConfigError: ``travel`` or ``speed_limit`` of a drive is too small.
+    """
+    if config.drives is None or config.drives.motors:
+        return
+    widths = config.safety.width_limit
+    for dof in Dof:
+        axis, sine = config.drives[dof], config.experiment[dof]
+        slack = SLACK * config[dof].expected_width
+        low, high = (sine.centre + sign * (sine.amplitude + slack) for sign in (-1, 1))
+        experiment = f"experiment.{dof.label}"
+        if not axis.travel[0] <= low < high <= axis.travel[1]:
+            allowed = f"at least {low:.3g} to {high:.3g}: {experiment}, and the slack on both sides"
+            allowed += f"; or less {experiment}.amplitude"
+            raise ConfigError(f"{dof.key}.travel", axis.travel, allowed)
+        is_shared = config.profile == "best" and dof in SHARED
+        for other in SHARED if is_shared else (dof,):
+            moved = config.experiment[other]
+            fastest = 2 * math.pi * moved.amplitude / moved.period
+            speed = config[dof].free_gain * fastest * widths[dof] / widths[other]
+            if speed > axis.speed_limit:
+                longer = moved.period * speed / axis.speed_limit
+                allowed = f"at least {speed:.3g}, {dof.label}.free_gain times the speed of "
+                allowed += f"experiment.{other.label}; or a period of that of {longer:.3g} or more"
+                raise ConfigError(f"{dof.key}.speed_limit", axis.speed_limit, allowed)
 
 
 class PlausibilityMonitor:

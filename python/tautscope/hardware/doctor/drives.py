@@ -7,13 +7,14 @@ import statistics
 import time
 from pathlib import Path
 
-from tautscope.config import DrivesConfig
+from tautscope.config import Config, DrivesConfig
 from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Motor
-from tautscope.errors import DriveError, TautscopeError
+from tautscope.errors import ConfigError, DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
 from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
 from tautscope.hardware.drives import open_group
+from tautscope.hardware.plausibility import check_experiment
 from tautscope.hardware.scale import Scale
 
 VIRTUAL_INTERFACES = ("virtual", "udp_multicast", "tautscope")
@@ -89,6 +90,15 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
     finally:
         group.close()
     return findings
+
+
+def check_commands(config: Config) -> CheckResult:
+    """Check that travel and speed limits are enough for the experiment, with compensation."""
+    try:
+        check_experiment(config)
+    except ConfigError as error:
+        return from_error("drives", "commands", error)
+    return CheckResult("drives", "commands", "ok", "travel and speed limits are enough for them")
 
 
 def _check_latency(config: DrivesConfig) -> list[CheckResult]:
