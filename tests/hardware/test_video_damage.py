@@ -42,6 +42,24 @@ def camera(width: int = WIDTH, height: int = HEIGHT, **source: str) -> CameraCon
     return CameraConfig(width=width, height=height, source=SourceConfig(**source))
 
 
+def turned(folder: Path, matrix: tuple[float, ...]) -> Path:
+    """A video that players turn."""
+    path = write(folder / "phone.mp4", "libx264", "yuv420p", images())
+    data, (a, b, c, d) = bytearray(path.read_bytes()), (round(65536 * each) for each in matrix)
+    place = (
+        data.find(b"tkhd") + 44
+    )  # display matrix of ISO/IEC 14496-12, 16.16 and 2.30 fixed point
+    data[place : place + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 0, 0, 1 << 30)
+    path.write_bytes(data)
+    return path
+
+
+def test_another_angle_is_refused(tmp_path: Path) -> None:
+    half = 2**-0.5
+    with pytest.raises(CameraError, match=r"turned by .?45 degrees.*multiples of 90"):
+        list(read_video(str(turned(tmp_path, (half, half, -half, half))), camera()))
+
+
 @pytest.mark.parametrize("angle", MATRICES)
 def test_frames_are_turned_as_opencv_turns_them(tmp_path: Path, angle: int) -> None:
     path = write(tmp_path / "phone.mp4", "libx264", "yuv420p", images())

@@ -157,7 +157,8 @@ class Decoder:
         """Decode all frames until the source ends.
 
         Raises:
-            CameraMismatchError: A frame does not have the configured size.
+            CameraMismatchError: A frame does not have the configured size, or is turned by an angle
+            that is no multiple of 90 degrees.
         """
         from av.error import InvalidDataError  # noqa: PLC0415  takes 0.1 s
 
@@ -181,7 +182,11 @@ class Decoder:
 
     def _decode(self, frame: av.VideoFrame) -> Iterator[DecodedFrame]:
         self.is_interlaced = bool(self.is_interlaced or frame.interlaced_frame)
-        turns = _TURNS[(frame.rotation + 179) % 360 - 179]
+        turns = _TURNS.get((frame.rotation + 179) % 360 - 179)
+        if turns is None:
+            raise CameraMismatchError(
+                "camera.source", f"images turned by {frame.rotation} degrees", "multiples of 90"
+            )
         if not self._has_fields and not turns:
             yield self._convert(frame)
             return
