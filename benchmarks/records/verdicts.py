@@ -1,4 +1,4 @@
-"""Verdicts on all real records, beside those of a person who has read them and seen the figures."""
+"""Verdicts on all real records, beside those of a reader who has seen the figures."""
 
 from __future__ import annotations
 

@@ -96,6 +96,7 @@ impl Configuration {
             None => Vec::new(),
         };
         let has_axes = !entries.is_empty();
+        let read: &[&str] = if has_axes { &OF_AXES } else { &OF_ARTICLE };
         for (name, own) in given {
             let name = name.as_str();
             match table.get_mut(name) {
@@ -103,11 +104,10 @@ impl Configuration {
                 _ if OF_PYTHON.contains(&name) => {}
                 None => return Err(unknown(name)),
                 Some(_) if has_axes && name == "kinematics" => check_kinematics(&own)?,
-                Some(section) => {
-                    if (if has_axes { &OF_AXES[..] } else { &OF_ARTICLE }).contains(&name) {
-                        merge(section, &own, name, &[], has_axes)?;
-                    }
+                Some(section) if read.contains(&name) => {
+                    merge(section, &own, name, &[], has_axes)?;
                 }
+                Some(_) => {}
             }
         }
         let dofs = if has_axes {
@@ -156,8 +156,7 @@ impl Dof {
 }
 
 /// Entries of `[[dof]]` with every default, and what they are called.
-fn axes(entries: Vec<Value>, default: Table) -> Result<(Value, Vec<Dof>), Error> {
-    let mut default = default;
+fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Error> {
     for key in ["name", "width_limit"] {
         default.remove(key);
     }
