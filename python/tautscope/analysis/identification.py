@@ -10,6 +10,7 @@ Eq. (1), k = 1 a loop without corners; in full strokes the loop is 2 r wide. A p
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,9 +102,11 @@ class Identification:
         if self.is_at_limit:
             return "the best fit is at the limit of the search"
         if not self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
-            limits = f"{self.width.low:.3g} and {self.width.high:.3g}".replace("inf", "any width")
-            largest = f"{100 * LARGEST_UNCERTAINTY:.0f} %"
-            return f"it is between {limits} (95 % interval), and not known to ± {largest}"
+            limits = f"{self.width.low:.3g} and {self.width.high:.3g} (95 % interval)"
+            between = (
+                f"it is between {limits}, and not known to ± {100 * LARGEST_UNCERTAINTY:.0f} %"
+            )
+            return "the record fits any width" if math.isinf(self.width.high) else between
         return ""
 
     @property
