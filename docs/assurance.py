@@ -100,6 +100,7 @@ PURPOSE = {
     "pysoem": "EtherCAT master",
     "rustypot": "packets of Dynamixel and Feetech servos",
     "dask": "benchmarks on a cluster",
+    "rerun-sdk": "export of logs for the Rerun viewer",
     "eclipse-zenoh": "messages of ROS 2, in the process of the loop",
     "rosbags": "types, hashes and CDR of ROS 2; bags",
     "websockets": "web server of the console, in a process of its own",
