@@ -1,13 +1,13 @@
 """`tautscope export --rerun`, read with Rerun's own reader."""
 
 import json
-import resource
+import shutil
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -166,7 +166,7 @@ def views_of(path: Path) -> dict[str, str]:
     """Name -> class of the views of the blueprint."""
     from rerun.chunk import RrdReader
 
-    reader, views = RrdReader(path.with_suffix(".rbl")), {}
+    reader, views = RrdReader(path), {}
     (blueprint,) = reader.blueprints()
     for chunk in reader.stream(store=blueprint):
         batch = chunk.to_record_batch()
@@ -208,29 +208,25 @@ def test_a_robot_without_images(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert len(views_of(out)) == 11
 
 
-@contextmanager
-def files_limited_to(size: int) -> Iterator[None]:
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-
-
 def test_nothing_half_written_remains(
-    files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: Files,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     out = tmp_path / "out" / "run.rrd"
     out.parent.mkdir()
-    with files_limited_to(200_000):
-        assert main(["export", str(files[0]), "--rerun", str(out)]) == 2
-    assert "a place that can be written" in capsys.readouterr().err
     (tmp_path / "no.mcap").write_bytes(b"no log")
     assert main(["export", str(tmp_path / "no.mcap"), "--rerun", str(out)]) == 2
+    with monkeypatch.context() as broken:  # Rerun's thread has ended after a chunk
+        broken.setattr(rerun.RecordingStream, "flush", Mock(side_effect=[None, RuntimeError]))
+        assert main(["export", str(files[0]), "--rerun", str(out)]) == 2
+    with monkeypatch.context() as full:
+        full.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
+        assert main(["export", str(files[0]), "--rerun", str(out)]) == 2
+    assert "MB free, not 0" in capsys.readouterr().err
     assert list(out.parent.iterdir()) == []
-    for taken in (out, out.with_suffix(".rbl")):
-        taken.write_text("mine")
+    out.write_text("mine")
     assert main(["export", str(files[0]), "--rerun", str(out)]) == 2
     assert "a file that does not exist yet" in capsys.readouterr().err
     assert out.read_text() == "mine"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
-from rerun.chunk import Chunk, LazyChunkStream
+from rerun.chunk import Chunk
 from rerun.encodings import Utf8Like
 
 from tautscope.config import Config
@@ -37,7 +38,7 @@ _RADIUS = -4.0  # negative: points of the screen, at every zoom
 
 
 def export_rerun(path: str | PathLike[str], out: str | PathLike[str]) -> tuple[Log, int]:
-    """Write a new Rerun recording (.rrd) of a log, and a blueprint (.rbl) beside it.
+    """Write a new Rerun recording (.rrd) of a log, with a blueprint; no viewer is opened.
 
     Timelines are the rig's clock and the wall clock. Scalars are in the display units that their
     names end with. The pinhole has no distortion, which Rerun does not know. Status is written
@@ -48,22 +49,35 @@ def export_rerun(path: str | PathLike[str], out: str | PathLike[str]) -> tuple[L
 
     Raises:
         MissingPathError, RecordError, ConfigError: As `read_log`; a log without a tick, too.
-        OutputError: A file exists already, or cannot be written.
+        OutputError: The file exists already, or cannot be written.
     """
-    with new_file(out) as partial, new_file(Path(out).with_suffix(".rbl")) as blueprint:
+    with new_file(out) as partial:
         log = read_log(path)
         chunks = _Chunks(log)
-        blueprint.write_bytes(_blueprint(log.config))
-        try:  # unlike `RecordingStream.save`, which may wait forever when the disk is full
-            LazyChunkStream.from_iter(chunks.all()).write_rrd(
-                partial, application_id=APPLICATION, recording_id=chunks.recording_id
-            )
-        except RuntimeError as error:
-            if "os error" not in str(error):
-                raise
+        _check_room(log.path, partial)
+        recording = rr.RecordingStream(
+            APPLICATION, recording_id=chunks.recording_id, send_properties=False
+        )
+        recording.save(partial, default_blueprint=_blueprint(log.config))
+        try:
+            for chunk in chunks.all():
+                recording.send_chunks(chunk)
+                recording.flush()  # else all images wait in memory
+        except RuntimeError as error:  # of Rerun's thread that writes
             allowed = f"a place that can be written ({error})"
             raise OutputError("out", str(out), allowed) from None
+        finally:
+            recording.disconnect()
     return log, chunks.images
+
+
+def _check_room(log: Path, out: Path) -> None:
+    """Check that the disk has room: Rerun's thread that writes may hang on a full one."""
+    most = 3 * log.stat().st_size + 2**26  # images are at most twice as large as in the log
+    if (free := shutil.disk_usage(out.parent).free) < most:
+        raise OutputError(
+            "out", str(out.parent), f"a disk with {most / 1e6:.0f} MB free, not {free / 1e6:.0f}"
+        )
 
 
 class _Chunks:
@@ -184,8 +198,8 @@ def _rgba(colour: str) -> int:
     return int(colour.removeprefix("#") + "ff", 16)
 
 
-def _blueprint(config: Config) -> bytes:
-    """A file with image and texts beside the time series of each degree of freedom."""
+def _blueprint(config: Config) -> rrb.Blueprint:
+    """Image and texts beside the time series of each degree of freedom."""
     series = [
         rrb.Vertical(
             *(
@@ -200,7 +214,7 @@ def _blueprint(config: Config) -> bytes:
     ]
     texts = rrb.TextLogView(origin="log", name="status, warnings, requests")
     image = [] if config.dof else [rrb.Spatial2DView(origin="endoscope", name="image")]
-    blueprint = rrb.Blueprint(
+    return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(*image, texts, row_shares=[3, 1] if image else [1]), rrb.Tabs(*series)
         ),
@@ -208,7 +222,3 @@ def _blueprint(config: Config) -> bytes:
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(timeline=RIG_TIME),
     )
-    stream = rr.RecordingStream(APPLICATION, send_properties=False)
-    file = rr.binary_stream(stream)
-    stream.send_blueprint(blueprint)
-    return file.read() or b""
