@@ -106,7 +106,7 @@ PURPOSE = {
     "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""
-LICENCES = {"pysoem": "MIT License", "rustypot": "Apache-2.0"}
+LICENCES = {"pysoem": "MIT License", "rerun-sdk": "MIT OR Apache-2.0", "rustypot": "Apache-2.0"}
 """Licence of packages that a clone does not install, or whose metadata do not name it."""
 
 SOUP = """# Software of unknown provenance
