@@ -48,7 +48,7 @@ class PlayTip:
 class Score:
     """RMS tracking errors of the last minute of motion, with and without compensation.
 
-    e = sqrt(mean((tip - reference)^2)) per DOF, over the ticks in which the reference moved and
+    e = sqrt(mean((tip - reference)^2)) per DOF, over the ticks in which its reference moved and
     the loop compensated, of the last `WINDOW` s of these.
 
     Args:
@@ -67,7 +67,7 @@ class Score:
         before, self._before = self._before, reference
         if before is None or (before == reference).all():
             return
-        known = np.isfinite(tip)
+        known = np.isfinite(tip) & (before != reference)
         errors = np.array([np.where(known, tip, reference), uncompensated]) - reference
         self._sum += np.vstack([known * errors**2, known])
         self._added += 1
