@@ -32,6 +32,7 @@ const FLAG_NAMES: [&CStr; 26] = [
     c"limit_cycle",
     c"slack_changed",
     c"geometry_off",
+    c"frame_rate",
 ];
 
 const REACTION_NAMES: [&CStr; 8] = [
