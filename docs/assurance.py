@@ -100,12 +100,13 @@ PURPOSE = {
     "pysoem": "EtherCAT master",
     "rustypot": "packets of Dynamixel and Feetech servos",
     "dask": "benchmarks on a cluster",
+    "rerun-sdk": "export of logs for the Rerun viewer",
     "eclipse-zenoh": "messages of ROS 2, in the process of the loop",
     "rosbags": "types, hashes and CDR of ROS 2; bags",
     "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""
-LICENCES = {"pysoem": "MIT License", "rustypot": "Apache-2.0"}
+LICENCES = {"pysoem": "MIT License", "rerun-sdk": "MIT OR Apache-2.0", "rustypot": "Apache-2.0"}
 """Licence of packages that a clone does not install, or whose metadata do not name it."""
 
 SOUP = """# Software of unknown provenance

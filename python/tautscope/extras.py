@@ -26,6 +26,7 @@ MODULES = {
     ),
     "ethercat": ("pysoem",),
     "servo": ("rustypot",),
+    "rerun": ("rerun",),
     "cluster": ("dask", "distributed"),
 }
 """Extra -> modules that it installs for import."""

@@ -12,14 +12,14 @@ import matplotlib
 from cycler import cycler
 from matplotlib.figure import Figure
 
-BLACK, GREY, LIGHT = "#222222", "#8a8a8a", "#eeeeee"
+BLACK, GREY = "#222222", "#8a8a8a"
 BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 SKY, AMBER, YELLOW = "#56b4e9", "#e69f00", "#f0e442"
 """Colours that readers with any colour vision can distinguish: Okabe and Ito, Color Universal
 Design (2008). Its vermillion is `ORANGE` and its orange `AMBER`; `YELLOW` is for images."""
 
-COLUMN, PAGE = 3.5, 7.2
-"""Widths of a column and of a page [inch]."""
+PAGE = 7.2
+"""Width of a page [inch]."""
 
 _STYLE: dict[str, Any] = {
     "font.size": 8,

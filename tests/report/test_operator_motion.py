@@ -10,7 +10,7 @@ from tautscope.report.operator_motion import (
     operator_motion,
 )
 from tautscope.report.tracking_bound import tracking_bound
-from tautscope.runs.recording import FRAME_COLUMNS, TRACE_COLUMNS, Recording, per_dof
+from tautscope.runs.recording import FRAME_COLUMNS, Recording, per_dof, trace_columns
 
 PERIOD = 0.02
 START = 100.0  # the rig's clock need not begin at 0
@@ -22,7 +22,7 @@ COUNTS = TIME >= 40
 
 def recording(error: float, before: float, compensated: bool) -> Recording:
     """A tip with one error in the first 40 s and another after it."""
-    trace = np.zeros(len(TIME), TRACE_COLUMNS)
+    trace = np.zeros(len(TIME), trace_columns(Dof))
     trace["time"] = START + TIME
     for dof in Dof:
         trace[f"reference_{dof.label}"] = REFERENCE[:, dof]

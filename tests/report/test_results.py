@@ -9,7 +9,7 @@ from tautscope.dof import Dof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
 from tautscope.report.results import DofResult, combine, evaluate
-from tautscope.runs.recording import FRAME_COLUMNS, TRACE_COLUMNS, Recording
+from tautscope.runs.recording import FRAME_COLUMNS, Recording, trace_columns
 
 START = 100.0  # the rig's clock need not begin at 0
 TIME = np.arange(7000) * 1e-3  # the segment: 1 s to 6 s
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 def recording(command: Floats, truth: Floats, estimate: Floats, compensated: bool) -> Recording:
-    trace = np.zeros(len(TIME), TRACE_COLUMNS)
+    trace = np.zeros(len(TIME), trace_columns(Dof))
     trace["time"] = START + TIME
     trace["reference_bending"] = REFERENCE
     trace["command_bending"] = command

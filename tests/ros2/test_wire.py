@@ -33,7 +33,7 @@ def test_tokens_are_those_of_the_design_document() -> None:
     assert inside.node_token().endswith("/NN/%/%lab%left/tautscope")
 
 
-@pytest.mark.parametrize("distribution", wire.DISTRIBUTIONS)
+@pytest.mark.parametrize("distribution", [wire.HUMBLE, wire.JAZZY])
 def test_keys_of_humble_have_no_type_hashes(distribution: str) -> None:
     kind = "std_msgs/msg/String"
     name = "TypeHashNotSupported" if distribution == "humble" else types.type_hash(kind)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import record
 from tautscope import Config, Frame
+from tautscope.loop.operating_state import OperatingState
 from tautscope.loop.reduction import Status
-from tautscope_node.control_loop import ControlLoop, OperatingState
+from tautscope_node.control_loop import ControlLoop
 
 START = np.array([25e-3, 0.0, 0.9])
 PERIOD = Config().control.period
@@ -187,7 +188,7 @@ def test_the_commands_are_those_of_the_loop_alone(profile, monkeypatch):
     monkeypatch.setattr(record, "DURATION", 56.0)
     recorded = record.record_features(profile)
     control = ControlLoop(recorded.config, Refused())
-    control.enable()
+    control.request("enable")
     images = iter(recorded.images)
     image = next(images)
     states = set()
@@ -235,7 +236,7 @@ class Held(Executor):
 def test_ticks_go_on_while_an_image_is_detected():
     executor = Held()
     control = ControlLoop(Config(), executor)
-    control.enable()
+    control.request("enable")
     control.set_reference(START, 0.0)
     image = np.zeros((576, 720, 3), np.uint8)
     frames = [Frame(image, number * PERIOD, number) for number in range(4)]
@@ -254,7 +255,7 @@ def test_ticks_go_on_while_an_image_is_detected():
 
 def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
     control = ControlLoop(Config(), Held())
-    control.enable()
+    control.request("enable")
     control.set_reference(START, 0.0)
     control.step(0.0)
     monkeypatch.setattr("tautscope.loop.vision.MarkerDetector", None)
@@ -264,7 +265,7 @@ def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
 def test_images_go_through_a_thread():
     with ThreadPoolExecutor(1) as executor:
         control = ControlLoop(Config(), executor)
-        control.enable()
+        control.request("enable")
         frame = Frame(np.zeros((576, 720, 3), np.uint8), 0.0, 1)
         control.set_reference(START, 0.0)
         control.step(0.0)

@@ -19,6 +19,7 @@ from tautscope.commands.video_options import (
 )
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
+from tautscope.extras import require_extras
 from tautscope.runs.output_folder import check_free
 
 if TYPE_CHECKING:
@@ -51,9 +52,9 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         verbs,
         "export",
         _export,
-        help="export a log as CSV or as a rosbag2 folder",
+        help="export a log as CSV, as a rosbag2 folder or for Rerun",
         description="Export a log, complete or truncated, as CSV (one line per tick, one line per "
-        "update) or as a rosbag2 folder.",
+        "update), as a rosbag2 folder, or as a recording with a blueprint for the Rerun viewer.",
         extras=["hardware"],
     )
     export.add_argument("file", type=Path, metavar="FILE.mcap")
@@ -67,6 +68,9 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         help="folder, new or empty [FILE-csv beside it]",
     )
     kinds.add_argument("--rosbag", type=Path, metavar="DIR", help="folder, new or empty")
+    kinds.add_argument(
+        "--rerun", type=Path, metavar="FILE.rrd", help="new file; needs the extra `rerun`"
+    )
     arguments.add_json(export)
 
     replay = arguments.add_verb(
@@ -128,6 +132,9 @@ def _export(options: argparse.Namespace) -> None:
         print(f"{options.rosbag}: {sum(recovery.messages.values())} messages.")
         _print_damage(file, recovery.damage)
         return
+    if options.rerun is not None:
+        _export_rerun(options)
+        return
     folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
     found = export_csv(file, folder)
     if options.json:
@@ -135,6 +142,19 @@ def _export(options: argparse.Namespace) -> None:
         return
     print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
     _print_damage(file, found)
+
+
+def _export_rerun(options: argparse.Namespace) -> None:
+    require_extras("tautscope export --rerun", ["rerun"])
+    from tautscope.log.rerun_export import export_rerun  # noqa: PLC0415
+
+    log, images = export_rerun(options.file, options.rerun)
+    if options.json:
+        damage = _damage(log.damage)
+        print_json({"file": str(options.rerun), "images": images, "damage": damage})
+        return
+    print(f"{options.rerun}: {len(log.events)} ticks, updates and requests, {images} images.")
+    _print_damage(options.file, log.damage)
 
 
 def _damage(damage: Damage) -> dict[str, int]:

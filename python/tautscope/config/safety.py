@@ -11,7 +11,6 @@ from tautscope.config.section import Section
 
 Range = tuple[float, float]
 Count = Annotated[int, Meta(ge=1)]
-SmoothingFactor = Annotated[float, Meta(gt=0, le=1)]
 
 
 class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.console import messages as msg
 from tautscope.console.publisher import Bands, Publisher, Update
@@ -22,7 +21,6 @@ from tautscope.log.reader import Update as LoggedUpdate
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Frame
 
-Floats = NDArray[np.float64]
 STATE_PERIOD = 0.02
 """Time between two states for the page [s]."""
 _IDLE_PERIOD = 0.1

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from tautscope.errors import OutputError, RecordError
+from tautscope.errors import RecordError
 from tautscope.log import topics
 from tautscope.log.mcap_file import McapFile
 from tautscope.log.mcap_records import Damage, read_messages
 from tautscope.log.reader import read_log
-from tautscope.runs.output_folder import check_free, check_free_file, new_folder
+from tautscope.runs.output_folder import check_free, new_file, new_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,33 +44,25 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
         RecordError: The file is not MCAP, or not a log of tautscope.
         OutputError: `out` exists already, or cannot be written.
     """
-    source, target = Path(path), check_free_file(out)
+    source, target = Path(path), Path(out)
     damage = Damage()
     skipped: Counter[str] = Counter()
     first = last = 0
-    partial = target.with_name(f".{target.name}.partial")
-    messages = read_messages(source, damage)
-    try:
-        with partial.open("wb") as file:
-            copy = McapFile(file)
-            for _, topic, message in messages:
-                if topic not in copy:
-                    skipped[topic] += 1
-                    continue
-                at = message.log_time
-                copy.add(topic, message.data, message.sequence, at, message.publish_time)
-                first, last = min(first or at, at), max(last, at)
-            if topics.CONFIG not in copy.counts:  # without it nothing of the copy can be read
-                found = ", ".join([*copy.counts, *skipped]) or "no messages"
-                raise RecordError(
-                    "log", f"{source} with {found}", f"a log of tautscope, with {topics.CONFIG}"
-                )
-            copy.finish()
-        partial.rename(target)
-    except OSError as error:
-        raise OutputError("out", str(target), f"a place that can be written ({error})") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with new_file(target) as partial, partial.open("wb") as file:
+        copy = McapFile(file)
+        for _, topic, message in read_messages(source, damage):
+            if topic not in copy:
+                skipped[topic] += 1
+                continue
+            at = message.log_time
+            copy.add(topic, message.data, message.sequence, at, message.publish_time)
+            first, last = min(first or at, at), max(last, at)
+        if topics.CONFIG not in copy.counts:  # without it nothing of the copy can be read
+            found = ", ".join([*copy.counts, *skipped]) or "no messages"
+            raise RecordError(
+                "log", f"{source} with {found}", f"a log of tautscope, with {topics.CONFIG}"
+            )
+        copy.finish()
     return Recovery(target, dict(copy.counts), dict(skipped), first, last, damage)
 
 

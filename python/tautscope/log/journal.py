@@ -43,7 +43,7 @@ class Journal:
         events: Index, time [s] and the arguments of `Codec.tick`, `Codec.update` or
             `request_messages`.
         images: Index, time [s], capture time [s], pixels, format.
-        warnings: Time [s] or None, and text.
+        warnings: Their texts.
         clock: Set at the loop's first call.
         dropped: Number of dropped ticks, updates and requests.
         dropped_images: Number of dropped images.
@@ -58,7 +58,7 @@ class Journal:
         self.path = path
         self.events: deque[tuple[int, float, tuple[Any, ...]]] = deque()
         self.images: deque[tuple[int, float, float, NDArray[np.uint8], ImageFormat]] = deque()
-        self.warnings: deque[tuple[float | None, str]] = deque()
+        self.warnings: deque[str] = deque()
         self._encoded_images: deque[tuple[int, float, float, bytes, str]] = deque()
         self.clock: msg.Clock | None = None
         self.dropped = self.dropped_images = 0
@@ -151,15 +151,14 @@ class Journal:
 
     def _warn(self, text: str) -> None:
         self._on_warning(f"{self.path}: {text}")
-        self.warnings.append((None, text))
+        self.warnings.append(text)
 
     def _write_events(self, file: McapFile) -> None:
         """Write everything but the images."""
         while self.warnings:
-            now, text = self.warnings.popleft()
-            clock = self.clock
-            stamp = time.time_ns() if clock is None or now is None else clock.nanoseconds(now)
-            file.add(topics.WARNING, msg.warning_message(stamp, text), 0, stamp)
+            stamp = time.time_ns()
+            message = msg.warning_message(stamp, self.warnings.popleft())
+            file.add(topics.WARNING, message, 0, stamp)
         while self.events:
             index, now, arguments = self.events.popleft()
             clock = self.clock

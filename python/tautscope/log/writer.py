@@ -179,9 +179,9 @@ class LogWriter:
         self._start_clock(now)
         self._enqueue(now, (request,))
 
-    def warn(self, text: str, now: float | None = None) -> None:
-        """Record a warning, at a rig time [s]."""
-        self._journal.warnings.append((now, text))
+    def warn(self, text: str) -> None:
+        """Record a warning."""
+        self._journal.warnings.append(text)
 
     @property
     def has_begun(self) -> bool:

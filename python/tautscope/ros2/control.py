@@ -20,6 +20,7 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
@@ -36,8 +37,6 @@ from tautscope.ros2.wire import Qos
 _LOG = logging.getLogger(__name__)
 _IDLE_PERIOD = 0.005
 """Time between two checks for requests while no loop runs [s]."""
-COMMANDS = ("enable", "disable", "pause", "resume")
-"""Values of ``state_command`` that are executed; CRTK has others."""
 
 
 class NodeControl:
@@ -78,7 +77,8 @@ class NodeControl:
     ) -> None:
         self._config, self._folder, self._executor = config, folder, executor
         self._telemetry, self._make_rig = telemetry, make_rig
-        self._source, self._sensors = Pausable(source), sensors
+        self._states = StateMachine()
+        self._source, self._sensors = Pausable(source, self._states), sensors
         self._on_result, self._achieved = on_result, Achieved(config)
         self._rig: Rig | None = None
         self.run: ControlRun | None = None
@@ -129,13 +129,13 @@ class NodeControl:
             self._fail(str(error))
 
     @property
-    def operating_state(self) -> str:
+    def operating_state(self) -> OperatingState:
         """The state in the words of CRTK."""
-        if self.fault:
-            return "FAULT"
-        if self.run is None:
-            return "DISABLED"
-        return "PAUSED" if self._source.is_paused or self.run.is_held else "ENABLED"
+        return self._states.state(self._reaction)
+
+    @property
+    def _reaction(self) -> Reaction:
+        return Reaction.NONE if self.run is None else self.run.loop.supervision.reaction
 
     def shut_down(self) -> None:
         """Stop the motors, close the log, release the rig."""
@@ -179,16 +179,17 @@ class NodeControl:
             self.lifecycle.trigger(ACTIVATE)
         elif command == "disable":
             self.fault, self._is_disabling = "", True
+            self._states.accept(command, self._reaction)
             self.lifecycle.trigger(DEACTIVATE)
-        elif command == "pause":
-            self._source.is_paused = self.run is not None
-        elif command == "resume" and self.run is not None:
-            self._source.is_paused = False
-            self._source.engage()
-            self.run.loop.engage()
-        elif command and command not in COMMANDS:
+        elif command in STATE_COMMANDS:
+            self._states.accept(command, self._reaction)
+            if command == "resume" and self.run is not None:
+                # Also where nothing is paused: then another publisher may take over.
+                self._source.engage()
+                self.run.loop.engage()
+        elif command:
             field = f"{self._commands.topic} string"
-            self._telemetry.refuse(MessageError(field, command[:32], ", ".join(COMMANDS)))
+            self._telemetry.refuse(MessageError(field, command[:32], ", ".join(STATE_COMMANDS)))
 
     def _change(self, transition: Transition) -> bool:
         """Carry out a transition of the lifecycle."""
@@ -204,7 +205,7 @@ class NodeControl:
                     if rig is not None:
                         rig.close()
         except TautscopeError as error:
-            self.fault = str(error)
+            self.fault, self._states.goal = str(error), OperatingState.FAULT
             _LOG.warning("%s", error)
             self._telemetry.warn(str(error))
             if transition is ACTIVATE and isinstance(self._rig, HardwareRig | PacedRig):
@@ -217,8 +218,9 @@ class NodeControl:
         """Enable the rig and start the loop at rest, where the instrument is."""
         rig = self._rig
         assert rig is not None
-        self.fault, self._is_disabling, self._source.is_paused = "", False, False
-        self._telemetry.state("DISABLED", is_busy=True)
+        self.fault, self._is_disabling = "", False
+        self._states.goal = OperatingState.DISABLED
+        self._telemetry.state(self.operating_state, is_busy=True)
         sample = reset_rig(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
         self._sensors.reset()
@@ -242,6 +244,7 @@ class NodeControl:
             run.loop.prepare_detection(Frame(blank, sample.time, 0))()
         run.set_compensation(float(self.parameters["compensation"]))
         self.run = run
+        self._states.accept("enable", self._reaction)
 
     def _add_measurements(self, run: ControlRun) -> None:
         """Add what sensors in ROS have measured to the sample for the next tick."""
@@ -255,6 +258,8 @@ class NodeControl:
         run, self.run = self.run, None
         if run is None:
             return
+        if not self.fault:
+            self._states.goal = OperatingState.DISABLED
         try:
             rig = self._rig
             if isinstance(rig, HardwareRig) and self._is_disabling:
@@ -279,7 +284,7 @@ class NodeControl:
     def _fail(self, fault: str) -> None:
         """End the run because of a fault."""
         _LOG.warning("%s", fault)
-        self.fault = fault
+        self.fault, self._states.goal = fault, OperatingState.FAULT
         if self.run is not None:
             self.run.note(f"rig off: {fault}")
         self._telemetry.warn(fault)

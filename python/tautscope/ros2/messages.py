@@ -20,13 +20,11 @@ LOST = (Status.NO_MARKERS, Status.STALE, Status.DUPLICATE, Status.REFUSED)
 """Updates that measured nothing."""
 
 
-def joint_state(
-    stamp: int, joints: Sequence[str], values: Iterable[float], frame: str = "guide"
-) -> Any:
+def joint_state(stamp: int, joints: Sequence[str], values: Iterable[float]) -> Any:
     """sensor_msgs/msg/JointState: positions (n,) [m or rad] at a wall clock time [ns]."""
     return types.make(
         "sensor_msgs/msg/JointState",
-        header=types.header(stamp, frame),
+        header=types.header(stamp, "guide"),
         name=list(joints),
         position=np.asarray(values, np.float64),
         velocity=_NOTHING,

@@ -14,6 +14,7 @@ from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Command, Received, Servo
 from tautscope.console.operator_input import DEAD_BAND, OperatorInput
 from tautscope.errors import MessageError
+from tautscope.loop.operating_state import OperatingState, StateMachine
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
 from tautscope.ros2.session import Node
@@ -44,14 +45,11 @@ class Pausable:
 
     Args:
         source: The source.
-
-    Attributes:
-        is_paused: Whether motion is held.
+        states: Has what was requested.
     """
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
-        self.is_paused = False
+    def __init__(self, source: Source, states: StateMachine) -> None:
+        self._source, self._states = source, states
         self.reset, self.engage = source.reset, source.engage
 
     @property
@@ -66,7 +64,8 @@ class Pausable:
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The reference of a tick."""
-        return self._source.update(now, period, command, is_held=is_held or self.is_paused)
+        is_held = is_held or self._states.goal is OperatingState.PAUSED
+        return self._source.update(now, period, command, is_held=is_held)
 
 
 class ServoReference:

@@ -39,7 +39,7 @@ class Node:
         name: Name of the node.
         namespace: Empty, or ``/name``.
         domain: ROS_DOMAIN_ID.
-        distribution: Of the nodes that it talks with, one of `wire.DISTRIBUTIONS`.
+        distribution: Of the nodes that it talks with, `HUMBLE` or `JAZZY`.
         connect: Endpoint of a router or another node; tried again until it answers. Empty: none.
         listen: Own endpoint, on the loopback interface.
         is_blocking: Whether a publisher waits while the transport is busy, and drops no message;

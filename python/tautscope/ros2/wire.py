@@ -14,7 +14,7 @@ from enum import StrEnum
 
 from tautscope.errors import MessageError
 
-HUMBLE, JAZZY = DISTRIBUTIONS = ("humble", "jazzy")
+HUMBLE, JAZZY = "humble", "jazzy"
 """Distributions of ROS whose keys differ: those of Jazzy and later ones have type hashes."""
 NO_HASH = "TypeHashNotSupported"
 """What the keys of Humble have in place of a type hash."""

@@ -61,6 +61,27 @@ def check_writable(path: Path) -> None:
         raise OutputError("out", str(path), allowed) from None
 
 
+@contextmanager
+def new_file(path: str | PathLike[str]) -> Iterator[Path]:
+    """Make a file that gets its name only when the block has ended without an error.
+
+    Yields:
+        The path of a temporary file beside it to write: renamed at the end, removed on an error.
+
+    Raises:
+        OutputError: The path is taken, or cannot be written.
+    """
+    target = check_free_file(path)
+    partial = target.with_name(f".{target.name}.partial")
+    try:
+        yield partial
+        partial.rename(target)
+    except OSError as error:
+        raise OutputError("out", str(target), f"a place that can be written ({error})") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
 def default_folder(verb: str) -> Path:
     """runs/<date-time>-<verb>."""
     return Path("runs") / f"{time.strftime('%Y-%m-%d-%H%M%S')}-{verb}"

@@ -57,7 +57,6 @@ def update_columns(config: Config) -> np.dtype[np.void]:
     return frame_columns(config.dofs, () if config.dof else FEATURES)
 
 
-TRACE_COLUMNS = trace_columns(Dof)
 FRAME_COLUMNS = frame_columns(Dof)
 
 

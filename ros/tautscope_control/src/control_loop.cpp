@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace tautscope_control {
 
@@ -19,30 +18,13 @@ bool contains(std::uint32_t requests, Request request) noexcept {
 
 static_assert(std::atomic<double>::is_always_lock_free && std::atomic<std::uint32_t>::is_always_lock_free);
 
-const char *name(OperatingState state) noexcept {
-    switch (state) {
-    case OperatingState::enabled:
-        return "ENABLED";
-    case OperatingState::paused:
-        return "PAUSED";
-    case OperatingState::fault:
-        return "FAULT";
-    default:
-        return "DISABLED";
-    }
-}
-
 std::optional<Request> parse_state_command(std::string_view text) noexcept {
-    constexpr std::pair<std::string_view, Request> commands[] = {
-        {"enable", Request::enable}, {"disable", Request::disable},         {"pause", Request::pause},
-        {"resume", Request::resume}, {"acknowledge", Request::acknowledge},
-    };
-    for (const auto &[command, request] : commands) {
-        if (text == command) {
-            return request;
+    for (const StateCommand &command : state_commands) {
+        if (text == command.name) {
+            return command.request;
         }
     }
-    return std::nullopt;
+    return text == "acknowledge" ? std::optional(Request::acknowledge) : std::nullopt;
 }
 
 std::string flag_names(std::uint32_t flags) {
@@ -104,7 +86,7 @@ Tick ControlLoop::step(double time) noexcept {
         return {command_, false, state_};
     }
     double made_at = made_at_;
-    const bool is_resting = is_paused_ || is_misplaced_;
+    const bool is_resting = goal_ == OperatingState::paused || goal_ == OperatingState::fault;
     if (is_resting || is_clutching_) {
         if (is_clutching_ && !is_resting && has_new_reference_) {
             // Where the operator is now is where the motion continues.
@@ -154,24 +136,21 @@ void ControlLoop::apply_requests(double time) noexcept {
     if (contains(requests, Request::acknowledge)) {
         tautscope_loop_acknowledge(loop_.handle());
     }
-    // What stops comes last, so that it wins.
-    if (contains(requests, Request::resume) && state_ == OperatingState::paused) {
-        engage();
-        engaged_at_ = time;
-    }
-    if (contains(requests, Request::enable) && state_ != OperatingState::enabled) {
-        enable();
-        engaged_at_ = time;
-    }
-    if (contains(requests, Request::pause) && state_ == OperatingState::enabled) {
-        is_paused_ = true;
-    }
-    if (contains(requests, Request::drive_fault) && state_ != OperatingState::disabled) {
-        tautscope_loop_raise_flag(loop_.handle(), TAUTSCOPE_FLAG_DRIVE_FAULT);
-    }
-    if (contains(requests, Request::disable)) {
-        state_ = OperatingState::disabled;
-        is_paused_ = is_misplaced_ = false;
+    for (const StateCommand &command : state_commands) {
+        if (command.request == Request::disable && contains(requests, Request::drive_fault) && state_ != OperatingState::disabled) {
+            tautscope_loop_raise_flag(loop_.handle(), TAUTSCOPE_FLAG_DRIVE_FAULT);
+        }
+        if (contains(requests, command.request) && ((command.states >> static_cast<unsigned>(state_)) & 1U) != 0) {
+            goal_ = command.goal;
+            if (command.request == Request::enable) {
+                enable();
+                engaged_at_ = time;
+            } else if (command.request == Request::resume) {
+                engage();
+                engaged_at_ = time;
+            }
+            update_state();
+        }
     }
     if (requests != 0) {
         update_state();
@@ -180,17 +159,12 @@ void ControlLoop::apply_requests(double time) noexcept {
 
 void ControlLoop::enable() noexcept {
     if (is_finite(command_)) {
-        is_misplaced_ = false;
         for (std::size_t i = 0; i < command_.size() && is_finite(measured_); ++i) {
-            is_misplaced_ |= std::abs(measured_[i] - command_[i]) > start_tolerance_[i];
+            if (std::abs(measured_[i] - command_[i]) > start_tolerance_[i]) {
+                goal_ = OperatingState::fault;
+                return;
+            }
         }
-        if (is_misplaced_) {
-            state_ = OperatingState::fault;
-            return;
-        }
-    }
-    state_ = OperatingState::enabled;
-    if (is_finite(command_)) {
         engage();
     } else if (is_finite(measured_)) {
         // The first reference passes: the command begins where the drives are.
@@ -201,9 +175,7 @@ void ControlLoop::enable() noexcept {
 
 void ControlLoop::engage() noexcept {
     tautscope_loop_engage(loop_.handle());
-    is_paused_ = false;
     is_clutching_ = is_finite(command_);
-    state_ = OperatingState::enabled;
 }
 
 void ControlLoop::update_state() noexcept {
@@ -211,20 +183,12 @@ void ControlLoop::update_state() noexcept {
     if (tautscope_loop_supervision(loop_.handle(), &now) != TAUTSCOPE_RESULT_OK) {
         now.reaction = TAUTSCOPE_REACTION_DISABLE;
     }
-    if (state_ != OperatingState::disabled) {
-        if (is_misplaced_ || now.reaction >= TAUTSCOPE_REACTION_QUICK_STOP) {
-            state_ = OperatingState::fault;
-        } else if (is_paused_ || now.reaction == TAUTSCOPE_REACTION_HOLD_MOTION) {
-            state_ = OperatingState::paused;
-        } else {
-            state_ = OperatingState::enabled;
-        }
-    }
+    state_ = goal_ == OperatingState::disabled ? goal_ : std::max(goal_, state_by_reaction[now.reaction]);
     published_state_.store(state_, std::memory_order_relaxed);
     reaction_.store(now.reaction, std::memory_order_relaxed);
     flags_.store(now.flags, std::memory_order_relaxed);
     latched_.store(now.latched, std::memory_order_relaxed);
-    published_misplaced_.store(is_misplaced_, std::memory_order_relaxed);
+    published_misplaced_.store(goal_ == OperatingState::fault, std::memory_order_relaxed);
 }
 
 } // namespace tautscope_control

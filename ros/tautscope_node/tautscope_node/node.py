@@ -26,12 +26,13 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from tautscope import Frame, Sample, load_config
 from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.measurement import Measurement
+from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.inputs import ImageReader, checked_stamp
 from tautscope.ros2.measurements import MeasurementReader
 
-from tautscope_node.control_loop import ControlLoop, OperatingState
+from tautscope_node.control_loop import ControlLoop
 from tautscope_node.messages import (
     DEFAULT_JOINTS,
     calibration_problem,
@@ -146,7 +147,7 @@ class InstrumentNode(LifecycleNode):
         self._session_timers = []
         if self._control is not None and self._last_state is not OperatingState.DISABLED:
             self._stop_drives()
-            self._control.disable()
+            self._control.request("disable")
             self._last_state = OperatingState.DISABLED
             self._status_publisher.publish_state(self._control)
             if results := self._achieved.results():
@@ -220,7 +221,7 @@ class InstrumentNode(LifecycleNode):
     def _on_state_command(self, message: StringStamped) -> None:
         if self._control is not None and not self._control.request(message.string):
             self.get_logger().warning(
-                f"state_command {message.string}: expected enable, disable, pause, resume or "
+                f"state_command {message.string}: expected {', '.join(STATE_COMMANDS)} or "
                 "acknowledge"
             )
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tautscope.errors import FieldError, OutputError
 
 Image = NDArray[np.uint8]
-Floats = NDArray[np.float64]
 
 MODULES = 8
 """Modules (black or white cells) per side of a square; a marker has 6."""

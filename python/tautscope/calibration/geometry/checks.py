@@ -13,7 +13,6 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
 
-Floats = NDArray[np.float64]
 LEAST_IMAGES = 100
 """Images with both bands."""
 LEAST_SHARE = 0.25

@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import display_text
@@ -18,7 +17,6 @@ from tautscope.hardware.doctor.sensors import check_sensors
 from tautscope.loop.actuators import ActuatedRig
 from tautscope.loop.rig import Rig, Sample, check_sample
 
-Floats = NDArray[np.float64]
 HOLD = 3.0
 """How long the rig is held [s, its clock]."""
 _TOLERANCE = 0.05

@@ -107,21 +107,6 @@ class ColonoscopeParameters:
             routing_twist=float(generator.uniform(-_MOST_TWIST, _MOST_TWIST)),
         )
 
-    def ideal(self) -> ColonoscopeParameters:
-        """A copy without friction, dead length, gravity and twist, and with stiff cables."""
-        return replace(
-            self,
-            routing_twist=0.0,
-            joint_friction=0.0,
-            joint_load_friction=0.0,
-            cable_stiffness=100 * self.cable_stiffness,
-            cable_friction=(0.0, 0.0),
-            cable_drag=0.0,
-            dead_length=(0.0, 0.0),
-            shaft_friction=0.0,
-            gravity=0.0,
-        )
-
 
 def _drawn(pair: tuple[float, float], generator: np.random.Generator) -> tuple[float, float]:
     x, y = (1 + SPREAD * generator.uniform(-1, 1, 2)).tolist()

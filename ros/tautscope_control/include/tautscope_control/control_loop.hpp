@@ -13,36 +13,15 @@
 #include <tautscope.hpp>
 
 #include "tautscope_control/detection_exchange.hpp"
+#include "tautscope_control/operating_state.hpp"
 
 namespace tautscope_control {
 
 using tautscope::Numbers;
 using tautscope::Values;
 
-/// Operating states of the collaborative robotics toolkit (CRTK).
-enum class OperatingState : std::uint8_t {
-    /// The loop does not run, and no command is to be sent.
-    disabled,
-    /// The reference is followed.
-    enabled,
-    /// The command is held; `resume` continues where the reference then is.
-    paused,
-    /// The drives are to be stopped; `enable` clears it, unless the loop has to be created anew.
-    fault,
-};
-
-/// The name in a message: "DISABLED", "ENABLED", "PAUSED", "FAULT".
-const char *name(OperatingState state) noexcept;
-
-/// What an operator or a drive asks of the loop.
-enum class Request : std::uint32_t {
-    disable = 1,
-    pause = 2,
-    drive_fault = 4,
-    enable = 8,
-    resume = 16,
-    acknowledge = 32,
-};
+/// The name in a message.
+inline const char *name(OperatingState state) noexcept { return operating_state_names[static_cast<std::size_t>(state)]; }
 
 /// The request of a CRTK `state_command`; none for any other text.
 std::optional<Request> parse_state_command(std::string_view text) noexcept;
@@ -139,9 +118,9 @@ private:
     bool has_new_reference_ = false;
     /// The next new reference is where the motion begins, wherever it is.
     bool is_clutching_ = false;
-    bool is_paused_ = false;
-    /// The drives were elsewhere when they should have been enabled.
-    bool is_misplaced_ = false;
+    /// The state that was asked for; `fault` if the drives were elsewhere when they should have been enabled.
+    OperatingState goal_ = OperatingState::disabled;
+    /// The state, which the supervisor may require to be a later one.
     OperatingState state_ = OperatingState::disabled;
     double share_ = 1.0;
     std::atomic<std::uint32_t> requests_{0};
