@@ -7,6 +7,7 @@ import shutil
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from running import AGE, Arm, RunningConsole, rests, running_console
 from tautscope.config import load_config
 from tautscope.console.paced_rig import PacedRig
 from tautscope.dof import Dof
+from tautscope.loop.construction import build_feature_model
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
@@ -268,6 +270,100 @@ def test_keys_steer_after_a_click_on_any_control(
     expect(page.locator("#hint")).to_contain_text("Keys write into the text field")
     page.keyboard.press("Escape")
     expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+
+
+@contextmanager
+def holding_image(page: Page, device: str, *at: float) -> Iterator[Callable[..., None]]:
+    """Hold a place of the image, in shares of its size, and move to others; at last let go."""
+    page.locator("#image").scroll_into_view_if_needed()
+    session = page.context.new_cdp_session(page)
+
+    def move(across: float, down: float, kind: str = "touchMove") -> None:
+        box = page.locator("#image").bounding_box()
+        width, height = page.evaluate("[image.width, image.height]")
+        assert box is not None
+        scale = min(box["width"] / width, box["height"] / height)
+        x = box["x"] + box["width"] / 2 + (across - 0.5) * width * scale
+        y = box["y"] + box["height"] / 2 + (down - 0.5) * height * scale
+        if device == "mouse":
+            page.mouse.move(x, y)
+        else:
+            touch(kind, [{"x": x, "y": y}])
+
+    def touch(kind: str, points: list[dict[str, float]]) -> None:
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    move(*at, "touchStart")
+    if device == "mouse":
+        page.mouse.down()
+    yield move
+    if device == "mouse":
+        page.mouse.up()
+    else:
+        touch("touchEnd", [])
+    session.detach()
+
+
+@pytest.mark.parametrize("device", ["mouse", "touch"])
+def test_the_tip_moves_to_a_place_of_the_image_while_it_is_held(
+    console: RunningConsole, open_page, device: str
+) -> None:
+    page = open_page()
+    page.set_viewport_size({"width": 390 if device == "touch" else 1280, "height": 800})
+    operator, camera = console.control.operator, console.control.config.camera
+    model = build_feature_model(console.control.config)
+    with holding_image(page, device, 0.4, 0.4):  # without the lease
+        assert rests(console)
+    take(page)
+    expect(page.locator("#image.offered")).to_be_visible(timeout=TIMEOUT)
+    insertion = operator.reference[0]
+    for turn in (0.2, -0.2):
+        u, v = model.predict(operator.reference + np.array([0, turn, turn]))[0][2:]
+        with holding_image(page, device, u / camera.width, v / camera.height):
+            wait(lambda: moves(console))
+            wait(lambda: not moves(console))
+            reached = model.predict(operator.reference)[0][2:]
+            assert np.hypot(*(reached - (u, v))) < 2
+    with holding_image(page, device, 0.1, 0.5):
+        wait(lambda: moves(console))
+    wait(lambda: not moves(console))  # released
+    assert rests(console)
+    with holding_image(page, device, 0.9, 0.5) as move:
+        wait(lambda: moves(console))
+        move(0.9, 1.2)
+        wait(lambda: not moves(console))
+        move(0.1, 0.5)  # back, without a new press
+        assert rests(console)
+        move(0.9, 1.2)  # and released beyond the image
+    with holding_image(page, device, 0.1, 0.5):
+        wait(lambda: moves(console))
+        page.evaluate("dispatchEvent(new Event('blur'))")
+        wait(lambda: not moves(console))
+        assert rests(console)
+    assert operator.reference[0] == insertion
+
+
+@pytest.mark.parametrize("by", ["Escape", "another page"])
+def test_a_stop_while_the_image_is_held_needs_a_new_press(
+    console: RunningConsole, open_page, by: str
+) -> None:
+    page, other = open_page(), open_page()
+    page.bring_to_front()
+    take(page)
+    expect(page.locator("#image.offered")).to_be_visible(timeout=TIMEOUT)
+    with holding_image(page, "mouse", 0.1, 0.1):
+        wait(lambda: moves(console))
+        if by == "Escape":
+            page.keyboard.press("Escape")
+        else:
+            other.locator("#stop").dispatch_event("pointerdown")
+        expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+        expect(page.locator("#image.offered")).to_have_count(0, timeout=TIMEOUT)
+        page.locator("#enable").press("Enter")
+        expect(page.locator("#motion")).to_have_text("READY", timeout=TIMEOUT)
+        assert rests(console)
+    with holding_image(page, "mouse", 0.9, 0.9):
+        wait(lambda: moves(console))
 
 
 def test_two_tabs_and_a_stop_by_the_one_that_watches(console: RunningConsole, open_page) -> None:

@@ -27,13 +27,14 @@ VALUES = st.recursive(
 )
 FIELDS = [
     "type", "lease", "sequence", "image", "axes", "is_holding", "name", "value", "dof", "text",
-    "profile", "token", "client", "width",
+    "profile", "token", "client", "width", "point",
 ]  # fmt: skip
 TYPES = ["hello", "stop", "take", "servo", "action", "setting", "profile", "drawn", "Received"]
 NEARLY = st.fixed_dictionaries(
     {"type": st.sampled_from(TYPES)},
     optional=dict.fromkeys(FIELDS[1:], VALUES)
-    | {"axes": st.lists(NUMBERS, max_size=4) | VALUES, "lease": NUMBERS, "sequence": NUMBERS},
+    | dict.fromkeys(("axes", "point"), st.lists(NUMBERS, max_size=4) | VALUES)
+    | {"lease": NUMBERS, "sequence": NUMBERS},
 )
 MARK = {"type": "action", "name": "mark"} | dict.fromkeys(("lease", "sequence", "image"), 2**53 - 1)
 CHANNELS = Channels(SharedMemory(multiprocessing.get_context("spawn"), Config()))
@@ -50,6 +51,7 @@ def check(message: object) -> None:
         assert 1 <= len(message.axes) <= 8
         assert all(-1 <= axis <= 1 for axis in message.axes)
         assert type(message.is_holding) is bool
+        assert message.point is None or all(0 <= pixel < 2**16 for pixel in message.point)
     if isinstance(message, msg.Setting):
         assert 0 <= message.value <= 1
         assert len(message.dof) <= 32
@@ -61,6 +63,9 @@ def check(message: object) -> None:
 @given(st.binary(max_size=200) | NEARLY.map(lambda found: json.dumps(found).encode()))
 @example(b'{"type":"servo","lease":1,"sequence":1,"image":1,"axes":[1e999,0,0],"is_holding":true}')
 @example(b'{"type":"servo","lease":1,"sequence":1,"image":1,"axes":[NaN,0,0],"is_holding":true}')
+@example(
+    b'{"type":"servo","lease":1,"sequence":1,"image":1,"axes":[0],"is_holding":true,"point":[1e999,0]}'
+)
 def test_any_bytes_are_a_message_within_its_ranges_or_refused(data: bytes) -> None:
     for decode in DECODERS:
         with contextlib.suppress(msgspec.MsgspecError, UnicodeError):
@@ -87,6 +92,7 @@ def test_nesting_ends_in_an_error(depth: int) -> None:
 def test_every_message_crosses_unchanged() -> None:
     for message in (
         msg.Stop(), msg.Take(), msg.Servo(1, 2, 3, (0.5, -1.0, 0.0), True),
+        msg.Servo(1, 2, 3, (0.0,), True, (0.0, 575.5)),
         msg.Action(1, 2, 3, "mark", "here"), msg.Setting(1, 2, 3, "scale", 0.5, "bending"),
         msg.SetProfile(1, 2, 3, "paper"),
     ):  # fmt: skip

@@ -55,6 +55,7 @@ class Desk:
         lease: int | None = None,
         sequence: int | None = None,
         image: int | None = None,
+        point: tuple[float, float] | None = None,
     ) -> None:
         self.sequence += 1
         if axes is None:
@@ -65,6 +66,7 @@ class Desk:
             self.images.newest if image is None else image,
             axes,
             is_holding,
+            point,
         )
         self.input.receive(Received(client, self.now, servo), self.now)
 

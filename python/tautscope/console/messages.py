@@ -17,6 +17,7 @@ Count = Annotated[int, Meta(ge=0, lt=2**53)]
 Axis = Annotated[float, Meta(ge=-1, le=1)]
 Share = Annotated[float, Meta(ge=0, le=1)]
 Text = Annotated[str, Meta(max_length=200)]
+Pixel = Annotated[float, Meta(ge=0, lt=2**16)]
 Axes = Annotated[tuple[Axis, ...], Meta(min_length=1, max_length=MOST_DOFS)]
 DofName = Annotated[str, Meta(max_length=32)]
 ActionName = Literal[
@@ -71,10 +72,12 @@ class Servo(Command, frozen=True, tag="servo"):
     Attributes:
         axes: (n,) speeds [of the largest speed times scale].
         is_holding: Whether the operator holds the device's enabling button.
+        point: (u, v) [px of the camera] pointed at in the image, in place of deflections.
     """
 
     axes: Axes
     is_holding: bool
+    point: tuple[Pixel, Pixel] | None = None
 
 
 class Action(Command, frozen=True, tag="action"):

@@ -16,6 +16,7 @@ from tautscope.config import Config
 from tautscope.console.lease import Lease
 from tautscope.console.messages import Received, Servo
 from tautscope.console.motion_limits import motion_limits
+from tautscope.console.pointing import Point, Pointing
 from tautscope.console.programs import Program
 
 Floats = NDArray[np.float64]
@@ -35,8 +36,9 @@ RAMP_TIME = 0.15
 class OperatorInput:
     """Integrates the commands of the holder of the lease into a reference.
 
-    At each tick v is the commanded speed, ramped up from rest, and u <- u + v dt. The reference
-    rests, and moves again only after the operator has let go of the input device once, when
+    At each tick v is the commanded speed, ramped up from rest, and u <- u + v dt. It is that of the
+    deflections, or by `Pointing` towards a pixel. The reference rests, and moves again only after
+    the operator has let go of the input device once, when
 
     - no command was accepted for `COMMAND_TIMEOUT`, or at rest for `IDLE_TIMEOUT`,
     - the lease changes,
@@ -79,6 +81,8 @@ class OperatorInput:
         self.program_ended = ""
         self.stopped_by = self.rested_by = ""
         self.refused: Counter[str] = Counter()
+        self._pointing: Final = None if config.dof else Pointing(config)
+        self._point: Point | None = None
         self._axes = np.zeros(count)
         self._velocity = np.zeros(count)
         self._accepted_at = -float("inf")
@@ -96,7 +100,8 @@ class OperatorInput:
 
     @property
     def _timeout(self) -> float:
-        by_hand = self.program is None and (self._axes.any() or self._velocity.any())
+        is_held = self._point is not None or self._axes.any()
+        by_hand = self.program is None and (is_held or self._velocity.any())
         return COMMAND_TIMEOUT if by_hand else IDLE_TIMEOUT
 
     def receive(self, received: Received, now: float) -> None:
@@ -105,9 +110,8 @@ class OperatorInput:
         assert isinstance(servo, Servo)
         # While a rig opens there are no images yet; then only the page's presence counts.
         moves = servo.is_holding or self.program is not None
-        reason = self._lease.refusal(received.client, servo, now, needs_image=moves)
-        if len(servo.axes) != len(self._axes):
-            reason = "not one deflection per degree of freedom"
+        reason = self._fault(servo)
+        reason = reason or self._lease.refusal(received.client, servo, now, needs_image=moves)
         if reason:
             self.refused[reason] += 1
             return
@@ -118,11 +122,12 @@ class OperatorInput:
         if not servo.is_holding:
             self.must_release &= bool(beyond.any())
             self.is_off_centre = self.must_release
-            self._axes[:] = 0
+            self._axes[:], self._point = 0, None
         elif not self.must_release:
             self.rested_by = ""
             self._end_program("the operator moves")
             self._axes[:] = np.sign(axes) * beyond / (1 - DEAD_BAND)
+            self._point = servo.point
 
     def start(self, program: Program) -> None:
         """Let a program move the reference from now on."""
@@ -149,7 +154,7 @@ class OperatorInput:
         if self.is_moving or not reason:
             self.rested_by = "" if self.program else reason
         self.must_release = True
-        self._axes[:] = 0
+        self._axes[:], self._point = 0, None
         self._velocity[:] = 0
         self._end_program(reason)
 
@@ -174,6 +179,14 @@ class OperatorInput:
             self._integrate(period, command)
         return self.reference.copy()
 
+    def _fault(self, servo: Servo) -> str:
+        """Why a deflection is none of this instrument, else empty."""
+        if len(servo.axes) != len(self._axes):
+            return "not one deflection per degree of freedom"
+        if servo.point is None or (self._pointing and self._pointing.is_in_image(servo.point)):
+            return ""
+        return "no point in an image of the bands"
+
     def _end_program(self, reason: str) -> None:
         if (program := self.program) is not None:
             share = f"{program.elapsed / program.duration:.0%}"
@@ -182,13 +195,23 @@ class OperatorInput:
         self.program = None
 
     def _integrate(self, period: float, command: Floats) -> None:
-        target = self._axes * self.scale * self._speed * self.is_coupled
+        speed = self.scale * self._speed * self.is_coupled
         lower, upper = self._limits
         low, high = np.minimum(self.reference, command), np.maximum(self.reference, command)
-        target[(high >= upper) & (target > 0)] = 0
-        target[(low <= lower) & (target < 0)] = 0
-        gain = period / RAMP_TIME * self._speed
-        ramped = np.clip(target, -(np.abs(self._velocity) + gain), np.abs(self._velocity) + gain)
+
+        def is_blocked(direction: Floats) -> NDArray[np.bool_]:
+            return (high >= upper) & (direction > 0) | (low <= lower) & (direction < 0)
+
+        allowed = np.abs(self._velocity) + period / RAMP_TIME * self._speed
+        if self._pointing is None or self._point is None:
+            target = self._axes * speed
+            target[is_blocked(target)] = 0
+        else:
+            place = self.reference, self._point
+            target = self._pointing.velocity(*place, speed, period, is_blocked)
+            # All by one factor, so that the direction stays that towards the pixel.
+            target /= max(1.0, np.max(np.abs(target) / allowed))
+        ramped = np.clip(target, -allowed, allowed)
         ramped[ramped * self._velocity < 0] = 0
         self._velocity = ramped
         self.reference = self.reference + ramped * period

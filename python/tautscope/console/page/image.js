@@ -1,6 +1,6 @@
 // The endoscope's image with the bands as measured and predicted, the tip, and the reference.
 
-const COLOURS = { measured: "#5dff7a", predicted: "#e6e6e6", tip: "#4fb4ff", target: "#ffffff", without: "#ff9a2e" };
+const COLOURS = { measured: "#5dff7a", predicted: "#e6e6e6", tip: "#4fb4ff", target: "#ffffff", without: "#ff9a2e", mark: "#ffe14d" };
 
 /** Draws the newest image; `onDrawn` gets the sequence of every image that is on the screen, and its width there. */
 export class ImageView {
@@ -10,7 +10,8 @@ export class ImageView {
     this.onDrawn = onDrawn;
     this.sequence = 0;
     this.drawnAt = -Infinity;
-    this.aspect = 1;
+    this.size = [1, 1];
+    this.mark = null; // the pixel pointed at
     this.waiting = null;
     this.isBusy = false;
     this.drawn = [];
@@ -53,7 +54,7 @@ export class ImageView {
     }
     // The overlay has the camera's pixels, of which the bitmap may have a part.
     const { width, height } = overlay;
-    this.aspect = width / height;
+    this.size = [width, height];
     context.setTransform(bitmap.width / width, 0, 0, bitmap.height / height, 0, 0);
     context.drawImage(bitmap, 0, 0, width, height);
     context.lineWidth = Math.max(1.5, height / 380);
@@ -69,6 +70,11 @@ export class ImageView {
     if (tip && target) this.#line([tip, target], COLOURS.target);
     if (target) this.#circle(target, radius, COLOURS.target);
     if (tip) this.#circle(tip, radius / 2.5, COLOURS.tip, true);
+    if (this.mark) {
+      const [u, v] = this.mark;
+      this.#line([[u - radius, v], [u + radius, v]], COLOURS.mark);
+      this.#line([[u, v - radius], [u, v + radius]], COLOURS.mark);
+    }
     this.sequence = overlay.sequence;
     this.drawnAt = performance.now();
     this.drawn.push(this.drawnAt);
@@ -80,7 +86,16 @@ export class ImageView {
   /** Pixels of the screen across the image, as `object-fit: contain` shows it. */
   get shownWidth() {
     const { clientWidth, clientHeight } = this.canvas;
-    return Math.ceil(devicePixelRatio * Math.min(clientWidth, clientHeight * this.aspect));
+    return Math.ceil(devicePixelRatio * Math.min(clientWidth, (clientHeight * this.size[0]) / this.size[1]));
+  }
+
+  /** The camera's pixel at a place of the window; null beside the image. */
+  pixel(x, y) {
+    const box = this.canvas.getBoundingClientRect();
+    const [width, height] = this.size;
+    const scale = Math.min(box.width / width, box.height / height);
+    const [u, v] = [width / 2 + (x - box.x - box.width / 2) / scale, height / 2 + (y - box.y - box.height / 2) / scale];
+    return u >= 0 && v >= 0 && u <= width && v <= height ? [u, v] : null;
   }
 
   /** Images per second of the last 50. */

@@ -4,6 +4,7 @@ import { Charts } from "./charts.js";
 import { ImageView } from "./image.js";
 import { Link, readToken } from "./link.js";
 import { PathView } from "./path.js";
+import { Pointing } from "./point.js";
 import { Sound } from "./sound.js";
 import { Steering, isText } from "./steer.js";
 
@@ -78,6 +79,8 @@ const control = new Link("/control", token, {
 const video = new Link("/video", token, { onMessage: (data) => view.receive(data) });
 const view = new ImageView($("image"), (image, width) => video.send({ type: "drawn", image, width }));
 const path = new PathView($("path"));
+const pointing = new Pointing(view, () =>
+  hasLease() && layout.sees_bands && ["ready", "moving"].includes(motion) && steering.isActive);
 const updates = []; // time and number of updates, of the newest states
 
 // Controls
@@ -116,7 +119,7 @@ function build(found) {
   $("legend").hidden = !seesBands;
   charts = new Charts($("charts"), dofs);
   const send = (message) => control.send(message);
-  steering = new Steering({ count: dofs.length, getCommand: () => command("servo"), send, onStop: stop });
+  steering = new Steering({ count: dofs.length, pointing, getCommand: () => command("servo"), send, onStop: stop });
   rows = dofs.map(controlsOf);
 }
 
@@ -240,6 +243,11 @@ function hint() {
   return `Hold a key, − or +, or a shoulder button of the gamepad and its sticks, to move. Escape stops.${pick}`;
 }
 
+function showPointing() {
+  $("pointing").hidden = Boolean(state.replay);
+  for (const element of [$("pointing"), $("image")]) element.classList.toggle("offered", pointing.isOffered());
+}
+
 function showTime() {
   $("timeline").hidden = !state.replay;
   $("controls").hidden = Boolean(state.replay);
@@ -278,6 +286,7 @@ function update() {
   showLease();
   showControls();
   showTime();
+  showPointing();
   facts();
 }
 setInterval(update, 100);

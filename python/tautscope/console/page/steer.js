@@ -20,10 +20,10 @@ export const isText = (element) => element instanceof Element && element.matches
 const bounded = (value) => (Number.isFinite(value) ? Math.max(-1, Math.min(1, value)) : 1);
 const isKnown = (pad) => pad.mapping === "standard";
 
-/** Sends the input for `count` axes; `getCommand` returns the fields of a command, or null without the lease. */
+/** Sends the input for `count` axes, or the pixel of `pointing`; `getCommand` returns the fields of a command, or null without the lease. */
 export class Steering {
-  constructor({ count, getCommand, send, onStop }) {
-    Object.assign(this, { count, getCommand, send, onStop });
+  constructor({ count, pointing, getCommand, send, onStop }) {
+    Object.assign(this, { count, pointing, getCommand, send, onStop });
     this.pressed = new Map(); // key or button -> axis and sign
     this.picked = PICKED;
     this.device = "keyboard";
@@ -88,6 +88,7 @@ export class Steering {
   /** Rest at once: the page is hidden, or another window has the focus. */
   #release() {
     this.pressed.clear();
+    this.pointing.release();
     this.#send([], false);
   }
 
@@ -113,7 +114,9 @@ export class Steering {
     this.hasRested = name === this.pad && (this.hasRested || (!isEnabled && sticks.every(([, value]) => Math.abs(value) < REST)));
     this.pad = name;
     const isMoved = isEnabled && this.hasRested;
-    this.#send(isMoved || !this.pressed.size ? sticks : [...this.pressed.values()], isMoved || this.pressed.size > 0);
+    const { point } = this.pointing;
+    if (point && !isMoved && !this.pressed.size) this.#send([], true, point);
+    else this.#send(isMoved || !this.pressed.size ? sticks : [...this.pressed.values()], isMoved || this.pressed.size > 0);
   }
 
   /** The buttons of a gamepad that are pressed since now. */
@@ -124,10 +127,10 @@ export class Steering {
     return new Set([...down].filter((button) => !before.has(button)));
   }
 
-  #send(moves, isHolding) {
+  #send(moves, isHolding, point = null) {
     const axes = Array(this.count).fill(0);
     for (const [axis, value] of moves) if (axis < this.count) axes[axis] = Math.max(-1, Math.min(1, axes[axis] + value));
     const command = this.getCommand();
-    if (command) this.send({ type: "servo", ...command, axes: axes.map((a) => a || 0), is_holding: isHolding });
+    if (command) this.send({ type: "servo", ...command, axes: axes.map((a) => a || 0), is_holding: isHolding, point });
   }
 }
