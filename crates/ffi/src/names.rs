@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char};
 use crate::types::TAUTSCOPE_ABI_VERSION;
 
 /// Names of the flags, in their order.
-const FLAG_NAMES: [&CStr; 26] = [
+const FLAG_NAMES: [&CStr; 27] = [
     c"frozen",
     c"late",
     c"duplicate",

