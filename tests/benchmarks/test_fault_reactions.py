@@ -36,7 +36,10 @@ EXPECTED_FLAGS = {
     "C9": (("hand_step", "hand_fast"), {"reference_jump", "reference_fast"}),
     "D1": (("axis_off",), {"drive_fault"}),
     "D5": (("axis_reversed",), {"following_error", "innovation"}),
-    "P5": (("clock_ahead", "clock_back"), {"late_tick", "clock", "sample.time", "late"}),
+    "P5": (
+        ("clock_ahead", "clock_back", "clock_slow"),
+        {"late_tick", "clock", "sample.time", "late", "frame_rate"},
+    ),
 }
 
 

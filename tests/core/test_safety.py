@@ -187,6 +187,32 @@ def test_without_a_camera_the_compensation_fades_with_motion() -> None:
     assert loop.supervision.lead == 0.0
 
 
+def test_while_the_estimate_is_held_no_image_moves_the_command() -> None:
+    """With images of a shifted tip, and without images, the commands are the same bits."""
+    loops = [HysteresisReduction(config()) for _ in range(2)]
+    commands: list[list[Floats]] = [[], []]
+    held = []
+    for tick in range(1000):
+        time = tick * PERIOD
+        for loop, sent in zip(loops, commands, strict=True):
+            sent.append(loop.step(reference(time)))
+        if tick % 8:
+            continue
+        for loop in loops:
+            if tick == 496:
+                loop.on_features(loop.predicted_features(time)[[2, 3, 0, 1]], time)
+            elif tick < 496 or loop is loops[0]:
+                # Within the innovation gate.
+                loop.on_features(loop.predicted_features(time) + 3.0 * (tick > 496), time)
+        if tick >= 496:
+            if loops[0].supervision.reaction is not Reaction.HOLD_ESTIMATE:
+                break
+            held.append(tick)
+    assert len(held) >= 4
+    np.testing.assert_array_equal(commands[0][: held[-1]], commands[1][: held[-1]])
+    assert np.ptp(np.array(commands[0])[496 : held[-1]], axis=0)[0] > 0.0
+
+
 def test_late_future_and_old_frames_are_refused() -> None:
     loop = HysteresisReduction(config())
     for _ in range(300):

@@ -180,6 +180,8 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
     // The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,
+    // Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    TAUTSCOPE_FLAG_FRAME_RATE = 26,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char};
 use crate::types::TAUTSCOPE_ABI_VERSION;
 
 /// Names of the flags, in their order.
-const FLAG_NAMES: [&CStr; 26] = [
+const FLAG_NAMES: [&CStr; 27] = [
     c"frozen",
     c"late",
     c"duplicate",
@@ -32,6 +32,7 @@ const FLAG_NAMES: [&CStr; 26] = [
     c"limit_cycle",
     c"slack_changed",
     c"geometry_off",
+    c"frame_rate",
 ];
 
 const REACTION_NAMES: [&CStr; 8] = [

@@ -345,4 +345,6 @@ pub enum TautscopeFlag {
     SlackChanged = 24,
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = 25,
+    /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    FrameRate = 26,
 }

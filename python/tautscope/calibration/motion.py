@@ -47,6 +47,7 @@ _IMAGE_DETECTORS = (
     "overcompensation",
     "slack_changed",
     "geometry_off",
+    "frame_rate",
     "width_limit",
 )
 

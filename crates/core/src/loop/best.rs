@@ -178,10 +178,10 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBloc
             measurement.distance,
             !updates_offsets,
         );
-        self.rows = self.estimate.coefficients();
         if !updates_offsets {
             return Updated::NOTHING;
         }
+        self.rows = self.estimate.coefficients();
         self.slack = self.estimate.slack();
         let measured = measurement.state;
         let has_changed = self

@@ -42,7 +42,8 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         };
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(sight, captured_at, sensor, past, &mut raised);
-        self.monitors.react_to_frame(raised);
+        let rate = self.monitors.check_rate(captured_at, sensor);
+        self.monitors.react_to_frame(raised.union(rate));
         outcome
     }
 

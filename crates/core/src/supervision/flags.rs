@@ -87,6 +87,8 @@ flags! {
     SlackChanged = "slack_changed",
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = "geometry_off",
+    /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    FrameRate = "frame_rate",
 }
 
 /// A set of flags.

@@ -3,6 +3,7 @@
 pub(crate) mod command_limiter;
 pub(crate) mod flags;
 pub(crate) mod frame_gate;
+pub(crate) mod frame_rate;
 pub(crate) mod input_device;
 pub(crate) mod monitors;
 pub(crate) mod motion_monitor;

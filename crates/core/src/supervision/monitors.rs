@@ -8,6 +8,7 @@ use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, FrameGate};
+use crate::supervision::frame_rate::FrameRate;
 use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
 use crate::supervision::reference_gate::ReferenceGate;
@@ -57,6 +58,7 @@ pub struct Monitors<const N: usize> {
     limiters: CommandLimiters<N>,
     /// A gate for each sensor.
     frames: [FrameGate<N>; SENSORS],
+    rates: [FrameRate; SENSORS],
     motion: MotionMonitor<N>,
     supervisor: Supervisor<N>,
     play_limits: [PlayLimit; N],
@@ -90,6 +92,7 @@ impl<const N: usize> Monitors<N> {
             gate: ReferenceGate::new(safety, dofs, period)?,
             limiters: CommandLimiters::new(safety, dofs, period, friction)?,
             frames: [FrameGate::new(safety, dofs)?; SENSORS],
+            rates: [FrameRate::NEW; SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,
             supervisor: Supervisor::new(safety)?,
             play_limits,
@@ -215,6 +218,13 @@ impl<const N: usize> Monitors<N> {
         let gate = self.frames.get_mut(sensor);
         let flags = gate.map_or(Flags::NONE, |gate| gate.check_arrival(arrival));
         self.enabled(flags)
+    }
+
+    /// Check whether the frames of one of the sensors come as often as before.
+    pub(crate) fn check_rate(&mut self, captured_at: f64, sensor: usize) -> Flags {
+        let rate = self.rates.get_mut(sensor);
+        let is_other = rate.is_some_and(|rate| rate.update(captured_at));
+        self.enabled(Flags::when(is_other, Flag::FrameRate))
     }
 
     /// Check the Mahalanobis distance of an innovation.

@@ -84,7 +84,7 @@ const fn rule(
 /// `lost` fades without a hold because a frame without markers updates nothing in any case; `unobservable` needs no hold
 /// because the state estimation holds a DOF that the markers do not determine.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 26] = [
+pub static TABLE: [Rule; 27] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -111,4 +111,5 @@ pub static TABLE: [Rule; 26] = [
     rule(Flag::LimitCycle,       Frame, &[(Fade, Auto)],                         false),
     rule(Flag::SlackChanged,     Frame, WARN,                                    false),
     rule(Flag::GeometryOff,      Frame, WARN,                                    false),
+    rule(Flag::FrameRate,        Frame, WARN,                                    false),
 ];
