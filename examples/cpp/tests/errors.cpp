@@ -168,7 +168,7 @@ void check_image(const std::string &toml) {
 void check_supervision(const std::string &toml) {
     tautscope::Loop loop(toml);
     loop.step({0.025, 0.0, 0.9}, 0.0);
-    FAILS(tautscope_loop_raise_flag(loop.handle(), 26), SIGNAL, "flag: got 26");
+    FAILS(tautscope_loop_raise_flag(loop.handle(), 27), SIGNAL, "flag: got 27");
     FAILS(tautscope_loop_set_compensation(loop.handle(), 1.5), SIGNAL, "compensation: got 1.5");
     FAILS(tautscope_loop_set_compensation(loop.handle(), nan), SIGNAL, "compensation");
     FAILS(tautscope_loop_supervision(loop.handle(), nullptr), NULL_POINTER, "supervision");
