@@ -33,8 +33,8 @@ def get(
 def test_pages_are_files_of_the_package_and_confined() -> None:
     pages = Pages(["127.0.0.1:1"])
     assert set(pages.files) == {
-        "/", "/index.html", "/style.css", "/icon.svg", "/plot.js",
-        *(f"/{name}.js" for name in ("main", "link", "image", "charts", "path", "point", "steer", "sound")),
+        "/", "/index.html", "/style.css", "/icon.svg", "/plot.js", "/point.js",
+        *(f"/{name}.js" for name in ("main", "link", "image", "charts", "path", "steer", "sound")),
     }  # fmt: skip
     assert sum(len(content) for _, content in set(pages.files.values())) < 200_000
     for path in pages.files:
