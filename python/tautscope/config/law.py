@@ -17,6 +17,6 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Largest speed of the predicted tip over that of the reference."""
     direction_travel: Positive = 0.01
     """Travel of the reference over which its direction is averaged."""
-    change_rate: Positive = 0.03
-    """Largest change of the contact offsets and of the predicted tip in use, per travel of the
+    change_rate: Positive = 0.01
+    """Largest lasting change of the contact offsets and of the predicted tip, per travel of the
     reference."""

@@ -16,11 +16,13 @@ const BELOW_LIMIT: f64 = 0.999;
 const STEPS: usize = 5;
 /// Speed of the tip over the predicted one, at most that of the command: while few plays slide, a tip that is a single play
 /// rests or moves like the command.
-const EARLY: f64 = 2.0;
+const EARLY: f64 = 1.4;
 /// Distance from the origin, in units, at which a change of the gain counts as one of the tip.
 const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
-const START: f64 = 3.0;
+const START: f64 = 5.0;
+/// Change of contact offsets and predicted tip, in units, that right or wrong images may make at once.
+const AT_ONCE: f64 = 0.03;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
@@ -38,9 +40,10 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
-/// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
-/// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
+/// contact   max(|dq|, min(EARLY |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
+/// trusted   coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
+/// in use    coefficients as near the estimated ones as contact offsets and q are within AT_ONCE / ratio^2 of the trusted
 /// ```
 ///
 /// with Birge's ratio of the last images: images that do not fit change little.
@@ -72,7 +75,9 @@ pub struct VectorLaw<const N: usize> {
     target: [f64; N],
     /// Travel of the reference, in units.
     travel: [f64; N],
+    /// Coefficients in use.
     rows: [Row; N],
+    trusted: [Row; N],
     share: f64,
     is_limited: bool,
 }
@@ -131,6 +136,7 @@ impl<const N: usize> VectorLaw<N> {
             target: [0.0; N],
             travel: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
+            trusted: [[0.0; COEFFICIENTS]; N],
             share: 1.0,
             is_limited: false,
         })
@@ -170,7 +176,7 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         let Some(last) = self.reference.replace(reference) else {
-            self.rows = *rows;
+            (self.rows, self.trusted) = (*rows, *rows);
             return reference;
         };
         let motion = subtract(reference, last);
@@ -237,8 +243,8 @@ impl<const N: usize> VectorLaw<N> {
         self.plays = self.follow(&self.plays, command);
     }
 
-    /// Moves the coefficients in use towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
-    /// this motion: wrong images move nothing at once, and right ones can take back what they did.
+    /// Moves the trusted coefficients towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
+    /// this motion, and those in use about them: wrong images move little at once, and right ones can take back what they did.
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
@@ -248,22 +254,24 @@ impl<const N: usize> VectorLaw<N> {
             .for_each(|(sum, own)| *sum += own);
         let by_gain = gain_row();
         let ahead = [1.0; N];
-        let now = self.transmission.deflection(&self.rows, &ahead);
+        let now = self.transmission.deflection(&self.trusted, &ahead);
         let new = self.transmission.deflection(rows, &ahead);
         let tip = self.plays.tip(rows, [true; N]);
-        let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
-        let dofs = self.rows.iter_mut().zip(rows).zip(self.travel);
-        for ((((used, estimated), own), (now, new)), off) in
-            dofs.zip(now.into_iter().zip(new)).zip(off)
-        {
-            let steeper = product(&by_gain, estimated) - product(&by_gain, used);
+        let off = subtract(tip, self.plays.tip(&self.trusted, [true; N]));
+        let coefficients = self.rows.iter_mut().zip(&mut self.trusted).zip(rows);
+        let changes = now.into_iter().zip(new).zip(off).zip(self.travel);
+        for (((used, trusted), estimated), (((now, new), off), own)) in coefficients.zip(changes) {
+            let steeper = product(&by_gain, estimated) - product(&by_gain, trusted);
             let change = (new - now).abs().max(off.abs()).max(FAR * steeper.abs());
-            // Without a change this is infinite or NaN, of which `min` makes 1.
             let known = START / own;
             let rate = self.settings.change_rate * (1.0 + known * known);
-            let share = (rate * travel / (change * ratio * ratio)).min(1.0);
-            for (used, new) in used.iter_mut().zip(estimated) {
-                *used += share * (new - *used);
+            let doubted = change * ratio * ratio;
+            // Without a change these are infinite or NaN, of which `min` makes 1.
+            let share = (rate * travel / doubted).min(1.0);
+            let at_once = (AT_ONCE / (doubted * (1.0 - share))).min(1.0);
+            for ((used, trusted), new) in used.iter_mut().zip(trusted).zip(estimated) {
+                *trusted += share * (new - *trusted);
+                *used = *trusted + at_once * (new - *trusted);
             }
         }
     }

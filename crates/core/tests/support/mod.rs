@@ -110,7 +110,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         law: LawSettings {
             tip_gain: 1.85,
             direction_travel: 0.01,
-            change_rate: 0.03,
+            change_rate: 0.01,
         },
         estimation: EstimateSettings {
             marker_deviation: 0.3,
