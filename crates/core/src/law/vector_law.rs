@@ -22,7 +22,7 @@ const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
 const START: f64 = 5.0;
 /// Change of contact offsets and predicted tip, in units, that right or wrong images may make at once.
-const AT_ONCE: f64 = 0.03;
+pub(crate) const AT_ONCE: f64 = 0.03;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
