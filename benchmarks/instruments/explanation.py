@@ -1,4 +1,4 @@
-"""Which properties explain the reductions: a forest's permutation importance, and a small tree."""
+"""Which properties explain the reductions: a forest's permutation importance."""
 
 from __future__ import annotations
 
@@ -9,20 +9,18 @@ from instruments.runs import Motion
 from scipy.stats import spearmanr
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.inspection import permutation_importance
-from sklearn.tree import DecisionTreeRegressor, export_text
 from tautscope.dof import Dof
 
 LEAST_SEEDS = 20
 """Fewer say nothing about this many properties."""
-SHOWN = 5
+SHOWN = 3
 
 
 def explain(rows: list[Row], motion: Motion) -> str:
     """Describe, per DOF, what the reduction of `best` depends on.
 
     A forest is fitted to all properties and, per property, the loss of explained variance (R^2)
-    by shuffling it is measured; the sign is that of Spearman's rank correlation. A tree of two
-    levels shows thresholds.
+    by shuffling it is measured; the sign is that of Spearman's rank correlation.
 
     Wrong when two properties act only together, or with few seeds: the importance is that for the
     seeds it was fitted to.
@@ -49,8 +47,5 @@ def explain(rows: list[Row], motion: Motion) -> str:
         for k in np.argsort(-importance)[:SHOWN]:
             rank = spearmanr(values[:, k], reduction).statistic
             lines.append(f"  {labels[k]:<28} {importance[k]:.2f}  rank correlation {rank:+.2f}")
-        tree = DecisionTreeRegressor(max_depth=2, min_samples_leaf=max(3, len(values) // 20))
-        tree.fit(values, reduction)
-        lines.append(export_text(tree, feature_names=labels, decimals=2).rstrip())
         parts.append("\n".join(lines))
     return "\n\n".join(parts)
