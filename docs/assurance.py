@@ -1,4 +1,4 @@
-"""Write the files of the controls of hazards into docs/safety.md, and docs/soup.md, for whoever assesses a rig.
+"""Write the files of each hazard into docs/safety.md, and docs/soup.md, for whoever assesses a rig.
 
 ``uv run docs/assurance.py``; tests/docs/test_assurance.py requires that both are up to date.
 """
