@@ -41,7 +41,7 @@ SHORT = {
     r"below ": "< ",
     r"of at least ": ">= ",
     r"of at most ": "<= ",
-    r"(\d) values, each a number$": r"\1 numbers",
+    r"(\d) values, each a number(?= and a|$)": r"\1 numbers",
     r"(\d) values, each": r"\1 x",
 }
 """Words of a range -> how the page writes them."""
@@ -79,13 +79,13 @@ def _row(path: str, key: Key) -> str:
     cells = (
         f"`{key.name}`",
         _default(key, _value(path, key.name)),
-        f"{_short(key.allowed)}{unit}".strip(),
-        key.text.replace(unit, "", 1),
+        f"{short_range(key.allowed)}{unit}".strip(),
+        key.text.removeprefix(f"{unit[1:]}; ").replace(unit, "", 1),
     )
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
 
 
-def _short(allowed: str) -> str:
+def short_range(allowed: str) -> str:
     """A range in symbols: ``> 0`` for ``a number above 0``; empty for a whole type."""
     if allowed in ("a number", "a text", "true or false", "a table"):
         return ""
