@@ -133,11 +133,13 @@ time are marked.
 
 
 def with_controls(page: str) -> str:
-    """docs/safety.md with the files that implement the control of each hazard."""
-    lines = ["| hazard | files |", "|---|---|"]
+    """docs/safety.md with the files that implement the controls, and the hazards of each."""
+    found: dict[str, list[str]] = {}
     for name, response in hazards(page):
-        files = ", ".join(f"`{file}`" for file in control_files(name, response))
-        lines.append(f"| {name} | {files} |")
+        for file in control_files(name, response):
+            found.setdefault(file, []).append(name)
+    lines = ["| file | controls of |", "|---|---|"]
+    lines += [f"| `{file}` | {', '.join(found[file])} |" for file in sorted(found)]
     before, rest = page.split("<!-- controls: begin -->\n")
     after = rest.partition("<!-- controls: end -->")[2]
     table = "\n".join(lines)

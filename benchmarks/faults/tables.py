@@ -72,15 +72,15 @@ def seeds(rows: Sequence[Row]) -> str:
 def table(rows: Sequence[Row]) -> str:
     """Return a line per kind: what it is, worst excursions, detection, and what the loop did."""
     lines = [
-        "| fault | hazard | what it is | runs | beyond | SILENT | transient: worst [mm, rad, rad] "
+        "| fault, hazard | what it is | beyond (SILENT) | transient: worst [mm, rad, rad] "
         "| permanent: worst | detected, median of the time [s] | highest reactions |",
-        "|---|---|---|--:|--:|--:|---|---|---|---|",
+        "|---|---|--:|---|---|---|---|",
     ]
     for name, kind in KINDS.items():
         if own := [row for row in rows if row["kind"] == name]:
             low, high = kind.severity
             what = kind.what + (f": {low:g} to {high:g} {kind.unit}" if kind.unit else "")
-            cells = (name, kind.hazard, what, *_cells(own))
+            cells = (f"{name} {kind.hazard}".strip(), what, *_cells(own))
             lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
@@ -88,10 +88,9 @@ def table(rows: Sequence[Row]) -> str:
 def _cells(own: Sequence[Row]) -> list[Any]:
     times = [row["detected"] for row in own if row["detected"] is not None]
     reached = Counter(row["reaction"] for row in own if row["reaction"] != "none")
+    silent = sum(row["ending"] == "SILENT" for row in own)
     return [
-        len(own),
-        sum(row["beyond"] for row in own) or "",
-        sum(row["ending"] == "SILENT" for row in own) or "",
+        f"{sum(row['beyond'] for row in own) or ''}{f' ({silent})' if silent else ''}",
         *(_excursion(part) for part in by_duration(own)),
         f"{len(times)}, {np.median(times):.2f}" if times else "0",
         ", ".join(f"{name} {count}" for name, count in reached.most_common(2)),
@@ -114,28 +113,29 @@ def beyond(rows: Sequence[Row]) -> str:
 def off_table(found: dict[str, Sequence[Row]]) -> str:
     """Return the table of detectors that were switched off, and which no run needs."""
     lines = [
-        "| detector off | runs repeated | worst, transient [mm] | worst, permanent [mm] "
-        "| transient, beyond 3 mm | SILENT | worst kinds |",
-        "|---|--:|--:|--:|--:|--:|---|",
+        "| detectors off: runs repeated | worst, transient [mm] | worst, permanent [mm] "
+        "| transient, beyond 3 mm | SILENT |",
+        "|---|--:|--:|--:|--:|",
     ]
     unused = []
+    alike: dict[tuple[Any, ...], list[str]] = {}
     for name, rows in found.items():
         repeated = sum(name in row["raised"] for row in rows)
         if not repeated:
             unused.append(f"`{name}`")
             continue
         transient, permanent = by_duration(rows)
-        worst = sorted(transient, key=lambda row: -row["excursion"][0])
-        cells = [
-            name,
-            repeated,
+        cells = (
             f"{_worst(transient):.2f}",
             f"{_worst(permanent):.2f}",
             sum(row["excursion"][0] > DETECTOR_OFF_GOAL for row in transient) or "",
             sum(row["ending"] == "SILENT" for row in rows) or "",
-            ", ".join(list(dict.fromkeys(row["kind"] for row in worst[:10]))[:2]),
-        ]
-        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+        )
+        alike.setdefault(cells, []).append(f"{name} {repeated}")
+    lines += [
+        "| " + " | ".join(map(str, (", ".join(names), *cells))) + " |"
+        for cells, names in alike.items()
+    ]
     number = len(next(iter(found.values())))
     none = f" No run raises {', '.join(unused)}." if unused else ""
     return f"{number} runs each.{none}\n\n" + "\n".join(lines)

@@ -23,15 +23,12 @@ def table() -> str:
     """Return the table, a line per flag."""
     source = SOURCE.read_text(encoding="utf-8")
     ladders = dict(_LADDER.findall(source))
-    lines = [
-        "| flag | detected at | reactions, and what ends each | escalates |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| flag | detected at | reactions, and what ends each |", "|---|---|---|"]
     for flag, source_tick, ladder, climbs in _RULE.findall(source):
         rungs = _RUNG.findall(ladders.get(ladder, ladder))
-        steps = ", then ".join(f"{snake(what)} ({snake(end)})" for what, end in rungs)
-        again = "yes" if climbs == "true" else ""
-        lines.append(f"| {snake(flag)} | {snake(source_tick)} | {steps} | {again} |")
+        joint = ", then " if climbs == "true" else ", or "
+        steps = joint.join(f"{snake(what)} ({snake(end)})" for what, end in rungs)
+        lines.append(f"| {snake(flag)} | {snake(source_tick)} | {steps} |")
     return "\n".join(lines)
 
 

@@ -123,6 +123,21 @@ def test_verdicts(run, ending, beyond):
     assert (row["ending"], row["beyond"]) == (ending, beyond)
 
 
+def test_detectors_that_are_off_with_equal_figures_share_a_row():
+    def rows(name, excursion):
+        run = tables.to_row(outcome((excursion, 0, 0), duration=1.0))
+        return [run | {"raised": [name]}, run | {"raised": []}]
+
+    found = {"late": rows("late", 1e-3), "clock": rows("clock", 4e-3), "lost": rows("lost", 1e-3)}
+    found["merged"] = rows("other", 9e-3)
+    lines = tables.off_table(found).splitlines()
+    assert "No run raises `merged`." in lines[0]
+    assert [line.split(" | ")[:2] for line in lines[4:]] == [
+        ["| late 1, lost 1", "1.00"],
+        ["| clock 1", "4.00"],
+    ]
+
+
 def test_goal_of_permanent_faults_is_the_compensated_slack_and_a_margin():
     np.testing.assert_allclose(evaluation.permanent_goal("paper")[0], 8.3e-3)
     np.testing.assert_allclose(evaluation.permanent_goal("best")[0], 10.3e-3)

@@ -65,6 +65,25 @@ def test_the_page_is_up_to_date() -> None:
     )
 
 
+def test_short_ranges_have_every_bound_and_choice() -> None:
+    short = configuration.short_range
+    assert short("a number above 0 and below 1") == "> 0 and < 1"
+    assert short("a whole number of at least 3") == "whole, >= 3"
+    assert short("2 values, each a number from -1 to 1") == "2 x -1 to 1"
+    for _, section in all_sections():
+        for key in keys(section):
+            bounds = re.findall(r'-?\d[\d.,]*\d|\d|"[^"]*"', key.allowed)
+            assert re.findall(r'-?\d[\d.,]*\d|\d|"[^"]*"', short(key.allowed)) == bounds, key.name
+
+
+def test_a_repeated_section_has_the_defaults_that_differ() -> None:
+    (text,) = re.findall(r"## `\[rotation\]`\n\n(.*)", configuration.page())
+    both = Config().insertion, Config().rotation
+    for name in msgspec.structs.asdict(both[0]):
+        first, second = (getattr(each, name) for each in both)
+        assert (f"`{name}` `{second}`" in text) == (first != second), name
+
+
 def test_placeholders_are_refused_by_name() -> None:
     with pytest.raises(ConfigError) as found:
         refuse_placeholders("article_rig")

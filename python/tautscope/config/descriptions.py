@@ -84,7 +84,7 @@ def keys(section: type[Section]) -> Iterator[Key]:
             Key(
                 field.name,
                 _plain(text),
-                "" if unit is None else unit[1],
+                "" if unit is None else _plain(unit[1]),
                 allowed_values(kind),
                 default,
                 is_required,
