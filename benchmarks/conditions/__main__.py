@@ -102,7 +102,8 @@ def main() -> None:
     with progress_bar(f"{sum(job.frames for job in work)} frames") as show_progress:
         rows = to_rows(run(work, options.workers, show_progress))
     if options.write:
-        named = f"Seeds {seeds[0]} to {seeds[-1]}."
+        frames = sum(job.frames for job in work) // len(CONDITIONS)
+        named = f"Seeds {seeds[0]} to {seeds[-1]}, {frames} images of each condition."
         insert(ROOT / "docs" / "conditions.md", "conditions", f"{named}\n\n{table(rows)}")
     print(json.dumps({"rows": rows}, allow_nan=False) if options.json else table(rows))
 

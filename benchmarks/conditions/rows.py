@@ -94,16 +94,16 @@ def to_rows(frames: Sequence[Evaluation]) -> list[dict[str, Any]]:
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """Return a Markdown table: a line per condition, both modes side by side."""
     lines = [
-        "| condition | n | visible | valid [%] | wrong accepted [%] | error [px] "
+        "| condition | visible | valid [%] | wrong accepted [%] | error [px] "
         "| without prediction: valid | wrong accepted | error |",
-        "|---|" + "--:|" * 8,
+        "|---|" + "--:|" * 7,
     ]
     for profile in (*CONDITIONS, "all"):
         own = {row["what"]: row for row in rows if row["profile"] == profile}
         if not own:
             continue
         some = next(iter(own.values()))
-        cells = [profile, str(some["n"]), str(some["n_visible"])]
+        cells = [profile, str(some["n_visible"])]
         for label in MODES:
             for what, form in (
                 ("valid", ".1f"),

@@ -69,46 +69,34 @@ def _rows(name: str, found: list[list[Result]]) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Markdown: ratios per record or family, then what follows the splices."""
+    """Markdown: ratios per record or family, then a line per horizon over all of them."""
     names = dict.fromkeys(row["record"] for row in rows)
 
-    def cells(name: str, quantity: str) -> list[str]:
-        own = [row for row in rows if row["record"] == name and row["quantity"] == quantity]
-        return [
-            f"{row['median']:.2f}" + (f" ({row['worst']:.2f})" if row["n"] > 1 else "")
-            for row in own
-        ]
-
-    def worst(name: str, quantity: str) -> list[str]:
-        own = [row for row in rows if row["record"] == name and row["quantity"] == quantity]
-        return [f"{row['worst']:.0f}" for row in own]
+    def of(quantity: str, key: str, value: Any) -> list[dict[str, Any]]:
+        return [row for row in rows if row["quantity"] == quantity and row[key] == value]
 
     shares = " | ".join(f"{100 * share:.0f} %" for share in HORIZONS)
-    lines = [
-        f"| record or family | {shares} | {shares} | {shares} |",
-        f"|---|{'--:|' * 3 * len(HORIZONS)}",
-    ]
+    lines = [f"| record or family | {shares} |", f"|---|{'--:|' * len(HORIZONS)}"]
     for name in names:
-        ratios = cells(name, "ratio to the best other model")
-        predicting = cells(name, "ratio to the best other predictor")
-        behind = worst(name, "strokes worse than trivial")
-        lines.append(f"| {name} | {' | '.join([*ratios, *predicting, *behind])} |")
-    spliced = [name for name in names if name in SPLICED]
-    if spliced:
-        lines += ["", f"| spliced | {shares} | {shares} |", f"|---|{'--:|' * 2 * len(HORIZONS)}"]
-        for name in spliced:
-            counts = [*worst(name, "strokes to follow"), *worst(name, "strokes to settle")]
-            lines.append(f"| {name} | {' | '.join(counts)} |")
-    missed = [row for row in rows if row["quantity"] == "ratio to the best other model"]
+        cells = [
+            f"{row['median']:.2f}" + (f" ({row['worst']:.2f})" if row["n"] > 1 else "")
+            for row in of("ratio to the best other model", "record", name)
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     for share in HORIZONS:
-        own = [row for row in missed if row["horizon"] == share]
+        own = of("ratio to the best other model", "horizon", share)
         held = sum(row["holds"] for row in own)
         ratios = [row["median"] for row in own]
+        most = (
+            f"{what} at most {max(row['worst'] for row in of(what, 'horizon', share)):.0f}"
+            for what in ("strokes worse than trivial", "strokes to follow", "strokes to settle")
+            if of(what, "horizon", share)
+        )
         lines += [
             "",
             f"At {100 * share:.0f} %: {held} of {len(own)} records and families hold {GOAL}; "
             f"median {np.median(ratios):.2f}, worst {max(ratios):.2f}, worst seed "
-            f"{max(row['worst'] for row in own):.2f}.",
+            f"{max(row['worst'] for row in own):.2f}; {', '.join(most)}.",
         ]
     return "\n".join(lines)
 

@@ -41,14 +41,12 @@ class Simulated:
         width: Of the slack [tip's unit]; 0 without slack, NaN if nothing determines it.
         delay: Of the tip [s].
         gain: Tip travel per command travel in contact.
-        noise: One of `NOISES`.
     """
 
     record: Record
     width: float
     delay: float
     gain: float
-    noise: float
 
 
 def to_record(time: Floats, command: Floats, tip: Floats) -> Record:
@@ -97,7 +95,7 @@ def simulate(kind: str, seed: int) -> Simulated:
         else:
             command, gain, width = _wrapped(counts * command), gain / counts, counts * width
     true = 0.0 if kind in WITHOUT_SLACK else np.nan if kind in UNDETERMINED else abs(gain) * width
-    return Simulated(to_record(time, command, measured), true, delay, gain, share)
+    return Simulated(to_record(time, command, measured), true, delay, gain)
 
 
 def _tip(kind: str, command: Floats, width: float) -> Floats:

@@ -68,14 +68,12 @@ class Answer:
 
     Attributes:
         says: One of `SAYS`.
-        slack: Width with its interval, its limit, or the reason why there is none.
-        effect: RMS error of the tip without and with the loop.
+        slack: Width with its interval, its limit, its interval alone, or why there is none.
         text: The verdict.
     """
 
     says: str
     slack: str
-    effect: str
     text: str
 
 
@@ -101,23 +99,22 @@ def evaluate(job: tuple[str, Path | None]) -> Answer:
 
 
 def _answer(verdict: Verdict) -> Answer:
-    found, unit, effect = verdict.found, verdict.record.units[1], ""
-    if verdict.compensation is not None:
-        effect = f"{verdict.compensation.before:.3g}, {verdict.compensation.after:.3g}"
+    found = verdict.found
     if found.is_identified:
-        return Answer("slack", verdict.width, effect, verdict.text)
+        return Answer("slack", verdict.width, verdict.text)
     if found.is_aligned:
-        return Answer("no slack", f"at most {found.width.high:.3g} {unit}", effect, verdict.text)
-    return Answer("unknown", found.missing, effect, verdict.text)
+        limit = f"at most {found.width.high:.3g} {verdict.record.units[1]}"
+        return Answer("no slack", limit, verdict.text)
+    return Answer("unknown", found.missing.partition(" (95 %")[0], verdict.text)
 
 
 def table(found: dict[str, Answer]) -> str:
     """Markdown: a row per record."""
-    lines = ["| record | says | slack | RMS now, with it | judgement |", "|---|---|---|--:|---|"]
+    lines = ["| record | says | slack | judgement |", "|---|---|---|---|"]
     for name, each in found.items():
         said, judgement = JUDGEMENTS.get(name, ("", ""))
         text = judgement if said == each.says else "**to be read**: the verdict has changed"
-        lines.append(f"| {name} | {each.says} | {each.slack} | {each.effect} | {text} |")
+        lines.append(f"| {name} | {each.says} | {each.slack} | {text} |")
     counts = (f"{sum(each.says == says for each in found.values())} {says}" for says in SAYS)
     listed = ", ".join(counts)
     return "\n".join([*lines, "", f"{len(found)} records: {listed}."])

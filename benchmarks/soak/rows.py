@@ -63,30 +63,19 @@ def _quantities(
 
 
 def table(found: Mapping[Case, Outcome]) -> str:
-    """Return a Markdown table: a line per case and DOF, of the seed with the largest ratio."""
-    lines = [
-        "| case | DOF | second tenth | largest later | last | ratio | width within 3 sigma "
-        "| gain within 3 sigma | held |",
-        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
-    ]
+    """Return a Markdown table: a line per case, each DOF of the seed with its largest ratio."""
+    labels = " | ".join(f"{dof.label} [{dof.display_unit}]" for dof in Dof)
+    lines = [f"| case | {labels} | ratio | within 3 sigma |", "|---|--:|--:|--:|--:|--:|"]
     for name, outcomes in _by_name(found).items():
+        cells = [name]
         for dof in Dof:
             worst = max(outcomes, key=lambda outcome: ratio(outcome, dof))
-            errors = dof.display_scale * np.array(worst.errors)[:, dof]
-            second, later = errors[REFERENCE_PART], errors[REFERENCE_PART + 1 :]
-            value = ratio(worst, dof)
-            missed = "" if value <= RATIO_GOAL else " (missed)"
-            cells = (
-                name,
-                dof.label,
-                *(f"{each:.3g} {dof.display_unit}" for each in (second, later.max(), later[-1])),
-                f"{value:.2f}{missed}",
-                *(_share(worst.coverage.get(each), dof) for each in ("width", "gain")),
-                f"{100 * worst.held:.1f} %",
-            )
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _share(values: Sequence[float] | None, dof: Dof) -> str:
-    return "-" if values is None else f"{100 * values[dof]:.0f} %"
+            errors = dof.display_scale * np.array(worst.errors)[REFERENCE_PART:, dof]
+            cells.append(f"{errors[0]:.3g}, {errors[1:].max():.3g}")
+        value = max(ratio(each, dof) for each in outcomes for dof in Dof)
+        cells.append(f"{value:.2f}" + ("" if value <= RATIO_GOAL else " (missed)"))
+        shares = [share for each in outcomes for of in each.coverage.values() for share in of]
+        cells.append(f"{100 * min(shares):.0f} %" if shares else "-")
+        lines.append(f"| {' | '.join(cells)} |")
+    held = max(outcome.held for outcome in found.values())
+    return "\n".join([*lines, "", f"Held: at most {100 * held:.1f} % of the images of a case."])

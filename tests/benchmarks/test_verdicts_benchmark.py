@@ -28,15 +28,14 @@ from records.honest import Outcome
 def test_confidence_is_right_only_where_it_is_due(
     truth: float, found: float, says: str, is_right: bool
 ) -> None:
-    assert Outcome(0.01, truth, (found, found - 1, found + 1), says).is_right == is_right
+    assert Outcome(truth, (found, found - 1, found + 1), says).is_right == is_right
 
 
 def test_the_table_counts_what_is_wrong() -> None:
-    outcomes = {job: Outcome(0.01, 4.0, (4.0, 3.9, 4.1), "slack") for job in honest.jobs()}
+    outcomes = {job: Outcome(4.0, (4.0, 3.9, 4.1), "slack") for job in honest.jobs()}
     first = next(iter(outcomes))
-    outcomes[first] = Outcome(0.01, 4.0, (5.0, 4.9, 5.1), "slack")
+    outcomes[first] = Outcome(4.0, (5.0, 4.9, 5.1), "slack")
     text = honest.table(outcomes)
-    assert "Right: 39 of 40." in text
     assert f"| all | {len(outcomes) - 1} of {len(outcomes)} | {len(outcomes)} | 0 | 0 |" in text
     assert f"not: {len(outcomes) - 1} of {len(outcomes)} (100%)" in text
     kinds = Counter(kind for kind, _ in outcomes)
@@ -64,6 +63,6 @@ def test_the_page_has_a_judgement_of_every_real_record() -> None:
 def test_a_changed_verdict_is_to_be_read_again() -> None:
     name, (says, judgement) = next(iter(verdicts.JUDGEMENTS.items()))
     for now in honest.SAYS:
-        text = verdicts.table({name: verdicts.Answer(now, "", "", "")})
+        text = verdicts.table({name: verdicts.Answer(now, "", "")})
         assert (judgement in text) == (now == says)
         assert ("to be read" in text) == (now != says)
