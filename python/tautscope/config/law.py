@@ -13,7 +13,7 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     serves all. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    tip_gain: Gain = 1.8
+    tip_gain: Gain = 2.0
     """Largest speed of the predicted tip over that of the reference."""
     direction_travel: Positive = 0.01
     """Travel of the reference over which its direction is averaged."""

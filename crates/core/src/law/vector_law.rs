@@ -16,7 +16,7 @@ const BELOW_LIMIT: f64 = 0.999;
 const STEPS: usize = 5;
 /// Speed of the tip over the predicted one, at most that of the command: while few plays slide, a tip that is a single play
 /// rests or moves like the command.
-const EARLY: f64 = 1.4;
+const EARLY: f64 = 2.0;
 /// Distance from the origin, in units, at which a change of the gain counts as one of the tip.
 const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
@@ -40,7 +40,7 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
-/// contact   max(|dq|, min(EARLY |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
+/// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// trusted   coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
 /// in use    coefficients as near the estimated ones as contact offsets and q are within AT_ONCE / ratio^2 of the trusted
