@@ -8,6 +8,6 @@ pub struct LawSettings {
     pub tip_gain: f64,
     /// Travel of the reference over which its direction is averaged.
     pub direction_travel: f64,
-    /// Largest change of the contact offsets and of the predicted tip in use, per travel of the reference.
+    /// Largest lasting change of the contact offsets and of the predicted tip, per travel of the reference.
     pub change_rate: f64,
 }
