@@ -21,8 +21,6 @@ const EARLY: f64 = 2.0;
 const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
 const START: f64 = 5.0;
-/// Change of contact offsets and predicted tip, in units, that right or wrong images may make at once.
-pub(crate) const AT_ONCE: f64 = 0.03;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
@@ -41,9 +39,8 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
-/// trusted   coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
+/// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
-/// in use    coefficients as near the estimated ones as contact offsets and q are within AT_ONCE / ratio^2 of the trusted
 /// ```
 ///
 /// with Birge's ratio of the last images: images that do not fit change little.
@@ -77,7 +74,6 @@ pub struct VectorLaw<const N: usize> {
     travel: [f64; N],
     /// Coefficients in use.
     rows: [Row; N],
-    trusted: [Row; N],
     share: f64,
     is_limited: bool,
 }
@@ -136,7 +132,6 @@ impl<const N: usize> VectorLaw<N> {
             target: [0.0; N],
             travel: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
-            trusted: [[0.0; COEFFICIENTS]; N],
             share: 1.0,
             is_limited: false,
         })
@@ -176,7 +171,7 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         let Some(last) = self.reference.replace(reference) else {
-            (self.rows, self.trusted) = (*rows, *rows);
+            self.rows = *rows;
             return reference;
         };
         let motion = subtract(reference, last);
@@ -243,8 +238,8 @@ impl<const N: usize> VectorLaw<N> {
         self.plays = self.follow(&self.plays, command);
     }
 
-    /// Moves the trusted coefficients towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
-    /// this motion, and those in use about them: wrong images move little at once, and right ones can take back what they did.
+    /// Moves the coefficients in use towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
+    /// this motion: wrong images move little, and right ones can take back what they did.
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
@@ -254,24 +249,22 @@ impl<const N: usize> VectorLaw<N> {
             .for_each(|(sum, own)| *sum += own);
         let by_gain = gain_row();
         let ahead = [1.0; N];
-        let now = self.transmission.deflection(&self.trusted, &ahead);
+        let now = self.transmission.deflection(&self.rows, &ahead);
         let new = self.transmission.deflection(rows, &ahead);
         let tip = self.plays.tip(rows, [true; N]);
-        let off = subtract(tip, self.plays.tip(&self.trusted, [true; N]));
-        let coefficients = self.rows.iter_mut().zip(&mut self.trusted).zip(rows);
+        let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
         let changes = now.into_iter().zip(new).zip(off).zip(self.travel);
-        for (((used, trusted), estimated), (((now, new), off), own)) in coefficients.zip(changes) {
-            let steeper = product(&by_gain, estimated) - product(&by_gain, trusted);
+        for ((used, estimated), (((now, new), off), own)) in
+            self.rows.iter_mut().zip(rows).zip(changes)
+        {
+            let steeper = product(&by_gain, estimated) - product(&by_gain, used);
             let change = (new - now).abs().max(off.abs()).max(FAR * steeper.abs());
             let known = START / own;
             let rate = self.settings.change_rate * (1.0 + known * known);
-            let doubted = change * ratio * ratio;
-            // Without a change these are infinite or NaN, of which `min` makes 1.
-            let share = (rate * travel / doubted).min(1.0);
-            let at_once = (AT_ONCE / (doubted * (1.0 - share))).min(1.0);
-            for ((used, trusted), new) in used.iter_mut().zip(trusted).zip(estimated) {
-                *trusted += share * (new - *trusted);
-                *used = *trusted + at_once * (new - *trusted);
+            // Without a change this is infinite or NaN, of which `min` makes 1.
+            let share = (rate * travel / (change * ratio * ratio)).min(1.0);
+            for (used, new) in used.iter_mut().zip(estimated) {
+                *used += share * (new - *used);
             }
         }
     }
