@@ -1,6 +1,6 @@
 """Tracking error over two hours of strokes shorter and longer than the slack.
 
-On ideal plays with features, and on the twin with its true features and noise. Every tenth of a
+On ideal plays, on the twin, and on the twin with faults of the images. Every tenth of a
 run is judged by itself. `--write` updates docs/soak.md.
 """
 

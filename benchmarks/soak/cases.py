@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from common.features import NOISE, update_from_features
 from common.small_images import full_size, with_small_images
+from faults.rigs import FeatureTwin
+from faults.scenarios import DURATION
 from numpy.typing import NDArray
 from plants.simulated import HALF, PlantRig
 from soak.references import PARTS, Motion, make_reference
 from tautscope.config import Config, load_config
+from tautscope.errors import TautscopeError
 from tautscope.loop.reduction import HysteresisEstimate, HysteresisReduction
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.twin import Twin
+from tautscope.twin.faults import KINDS, Fault, FaultyRig, FeatureFrame, Target
 
 Floats = NDArray[np.float64]
-PlantName = Literal["plays", "twin"]
-PLANTS: tuple[PlantName, ...] = ("plays", "twin")
+PlantName = Literal["plays", "twin", "faults"]
+PLANTS: tuple[PlantName, ...] = ("plays", "twin", "faults")
 GAIN = 1.0
 """Gain of the ideal plays."""
 SIGMAS = 3.0
@@ -28,6 +33,13 @@ SAMPLE_EVERY = 1.0
 """Time between two comparisons of the intervals with the truth [s]."""
 LEAST_VISIBLE = 0.5
 """A band is measured if at least this share of it is visible."""
+FAULT_EVERY = 60.0
+"""One fault of the images begins in each such time [s]."""
+IMAGE_FAULTS = tuple(
+    kind.name
+    for kind in KINDS.values()
+    if kind.target in {Target.FEATURES, Target.FRAMES} and kind.has_duration
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +47,8 @@ class Case:
     """Complete description of a run.
 
     Attributes:
-        plant: Independent ideal plays, or the twin with its true features and noise.
+        plant: Independent ideal plays; the twin with its true features and noise; or the twin
+            with a fault of the images in every minute.
         motion: ``sines``, or ``hand``, an operator's motion.
         stroke: Longest stroke over the width of the slack.
         seed: Of noise and motion.
@@ -90,7 +103,7 @@ def simulate(case: Case) -> Outcome:
         squares[part] += (sample.true_state - desired) ** 2
         counts[part] += 1
         if sample.frame is not None:
-            _update(loop, sample.frame, case.plant, noise)
+            _update(loop, sample.frame, noise)
             images += 1
             if _is_held(loop):
                 held += 1
@@ -108,14 +121,29 @@ def simulate(case: Case) -> Outcome:
 def _make_rig(case: Case, config: Config) -> Rig:
     if case.plant == "plays":
         return PlantRig(config, "independent plays")
+    if case.plant == "faults":
+        return FaultyRig(FeatureTwin(config), draw_faults(case), case.seed)
     return Twin(with_small_images(config))
 
 
-def _update(
-    loop: HysteresisReduction, frame: Frame, plant: PlantName, noise: np.random.Generator
-) -> None:
-    if plant == "plays":
-        update_from_features(loop, frame)
+def draw_faults(case: Case) -> list[Fault]:
+    """One transient fault of the images per `FAULT_EVERY`, of any kind and severity."""
+    rng = np.random.default_rng([case.seed, 2])
+    return [
+        Fault(
+            kind := str(rng.choice(IMAGE_FAULTS)),
+            begin + float(rng.uniform(0, FAULT_EVERY - DURATION[1])),
+            float(rng.uniform(*DURATION)),
+            float(rng.uniform(*KINDS[kind].severity)),
+        )
+        for begin in np.arange(0, case.seconds, FAULT_EVERY).tolist()
+    ]
+
+
+def _update(loop: HysteresisReduction, frame: Frame, noise: np.random.Generator) -> None:
+    if isinstance(frame, FeatureFrame):
+        with suppress(TautscopeError):  # the supervision reports it as well
+            update_from_features(loop, frame)
         return
     assert frame.true_features is not None and frame.true_visible is not None
     is_visible = frame.true_visible >= LEAST_VISIBLE

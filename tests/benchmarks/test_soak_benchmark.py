@@ -9,7 +9,17 @@ import pytest
 from common.paths import ROOT
 from numpy.typing import NDArray
 from plants.simulated import HALF
-from soak.cases import PLANTS, Case, Outcome, PlantName, _Coverage, simulate
+from soak.cases import (
+    FAULT_EVERY,
+    IMAGE_FAULTS,
+    PLANTS,
+    Case,
+    Outcome,
+    PlantName,
+    _Coverage,
+    draw_faults,
+    simulate,
+)
 from soak.references import MOTIONS, PARTS, RETURN, Motion, make_reference
 from soak.rows import table, to_rows
 from tautscope.config import load_config
@@ -51,6 +61,15 @@ def test_every_tenth_is_judged_by_itself(plant: PlantName) -> None:
     assert np.all(errors > 0) and np.all(errors < 1.2 * HALF), errors
     assert outcome.held == 0
     assert not outcome.coverage or plant == "plays"
+
+
+def test_each_minute_has_one_fault_of_the_images_and_time_without_it() -> None:
+    case = Case("faults", "hand", 1.0, 700, 7200.0)
+    faults = draw_faults(case)
+    assert faults == draw_faults(case)
+    assert [int(fault.start // FAULT_EVERY) for fault in faults] == list(range(120))
+    assert all(fault.start % FAULT_EVERY + fault.duration <= FAULT_EVERY for fault in faults)
+    assert len({fault.kind for fault in faults}) > 0.9 * len(IMAGE_FAULTS)
 
 
 def outcome(*insertion: float, coverage: dict[str, list[float]] | None = None) -> Outcome:
