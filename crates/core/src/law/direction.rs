@@ -4,8 +4,8 @@ use crate::dof::Friction;
 
 /// Direction of the intended motion: of each friction group a string that the motion of its surface pulls.
 ///
-/// It is a (vector) play of the reference: rate independent, and unchanged by what stays within the string's length. A
-/// reversal turns it within a travel of that length.
+/// It is a (vector) play of the reference: rate independent. A reversal turns it within a travel of twice the string's length;
+/// a tremor, which is shorter, turns it in part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction<const N: usize> {
     friction: Friction<N>,
@@ -50,16 +50,13 @@ impl<const N: usize> Direction<N> {
         }
     }
 
-    /// The direction (N,): of each group of length 1, or 0.
+    /// The direction (N,): of each group the string over its length, 1 at most.
     pub fn value(&self) -> [f64; N] {
         let mut value = self.string;
-        for group in 0..N {
+        for (group, length) in self.length.into_iter().enumerate() {
             let members = self.friction.members(group);
-            let length = norm(&self.string, members);
-            if length > 0.0 {
-                let own = value.iter_mut().zip(members).filter(|(_, own)| *own);
-                own.for_each(|(value, _)| *value /= length);
-            }
+            let own = value.iter_mut().zip(members).filter(|(_, own)| *own);
+            own.for_each(|(value, _)| *value /= length);
         }
         value
     }

@@ -21,6 +21,9 @@ const EARLY: f64 = 2.0;
 const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
 const START: f64 = 5.0;
+/// Largest rate at which the command's speed grows beyond the reference's, in `width_limit` / s^2: a tremor, which reverses
+/// ten times a second, must not drive the motors across the slack each time.
+pub(crate) const ACCELERATION: f64 = 40.0;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
@@ -37,7 +40,8 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// ```text
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
-/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
+/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period,
+///           |dc| - |du| grows by at most ACCELERATION period^2 in a tick, from 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
@@ -60,6 +64,10 @@ pub struct VectorLaw<const N: usize> {
     gain: [f64; N],
     /// Largest |dc| in a tick.
     step_limit: [f64; N],
+    /// Most by which |dc| - |du| grows in a tick.
+    growth: f64,
+    /// |dc| - |du| of each group in the last tick, 0 or above.
+    surplus: [f64; N],
     limits: [PlayLimit; N],
     direction: Direction<N>,
     reference: Option<[f64; N]>,
@@ -85,8 +93,10 @@ pub struct Bounds<const N: usize> {
     pub gain: [f64; N],
     /// Largest slack that is compensated [m or rad], in which the bounds compare DOFs.
     pub width_limit: [f64; N],
-    /// Largest |dc| in a tick [m or rad].
-    pub step: [f64; N],
+    /// Largest |dc| / period [m/s or rad/s].
+    pub speed: [f64; N],
+    /// Control period [s].
+    pub period: f64,
     /// Limits of the contact offsets.
     pub offsets: [PlayLimit; N],
 }
@@ -120,7 +130,11 @@ impl<const N: usize> VectorLaw<N> {
             settings,
             weight: over(transmission.unit(), bounds.width_limit),
             gain,
-            step_limit: bounds.step.map(|step| step * BELOW_LIMIT),
+            step_limit: bounds
+                .speed
+                .map(|speed| speed * bounds.period * BELOW_LIMIT),
+            growth: ACCELERATION * bounds.period * bounds.period,
+            surplus: [0.0; N],
             limits: bounds.offsets,
             direction: Direction::new(friction, transmission.unit(), settings.direction_travel),
             transmission,
@@ -178,7 +192,9 @@ impl<const N: usize> VectorLaw<N> {
         if motion.iter().all(|motion| *motion == 0.0) {
             return self.command;
         }
+        let before = self.direction.value();
         self.direction.step(motion);
+        let direction = self.direction.value();
         self.follow_estimate(rows, motion, ratio);
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
@@ -192,13 +208,20 @@ impl<const N: usize> VectorLaw<N> {
         for group in 0..N {
             let members = self.transmission.friction().members(group);
             let gain = self.gain.get(group).copied().unwrap_or(1.0);
-            let step = self.bounded_step(members, gain, relative, moved);
-            let is_still = moved
-                .iter()
-                .zip(members)
-                .all(|(moved, own)| !own || *moved == 0.0);
-            if is_still {
+            let own = only(members, moved);
+            if own == [0.0; N] {
                 continue;
+            }
+            let has_turned = dot([1.0; N], only(members, before), direction) < 0.0;
+            let surplus = self.growth
+                + self
+                    .surplus
+                    .get(group)
+                    .map_or(0.0, |last| if has_turned { 0.0 } else { *last });
+            let step = self.bounded_step(members, gain, surplus, relative, own);
+            let faster = (self.norm(step) - self.norm(own)).max(0.0);
+            if let Some(last) = self.surplus.get_mut(group) {
+                *last = faster;
             }
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
@@ -324,25 +347,24 @@ impl<const N: usize> VectorLaw<N> {
         target
     }
 
-    /// The motion of the commands of a group towards the target, within the bounds, for a reference and its motion (N,), all
-    /// in units.
+    /// Length of a motion (N,) in units, in `width_limit`.
+    fn norm(&self, motion: [f64; N]) -> f64 {
+        libm::sqrt(dot(self.weight, motion, motion))
+    }
+
+    /// The motion of the commands of a group towards the target, within the bounds, for a reference and the motion of the
+    /// group's own (N,), which is not 0, all in units.
     fn bounded_step(
         &self,
         members: [bool; N],
         gain: f64,
+        surplus: f64,
         reference: [f64; N],
         motion: [f64; N],
     ) -> [f64; N] {
-        let (dot, norm) = (
-            |a, b| dot(self.weight, a, b),
-            |a| libm::sqrt(dot(self.weight, a, a)),
-        );
-        let motion = only(members, motion);
+        let (dot, norm) = (|a, b| dot(self.weight, a, b), |a| self.norm(a));
         let moved = norm(motion);
         let mut step = only(members, subtract(self.target, self.plays.command));
-        if moved == 0.0 {
-            return [0.0; N];
-        }
         // Never against the reference.
         let against = dot(step, motion).min(0.0) / (moved * moved);
         step.iter_mut()
@@ -352,7 +374,7 @@ impl<const N: usize> VectorLaw<N> {
         if length == 0.0 {
             return step;
         }
-        let mut share = (gain * moved / length).min(1.0);
+        let mut share = ((gain * moved).min(moved + surplus) / length).min(1.0);
         for (step, (limit, unit)) in step
             .iter()
             .zip(self.step_limit.into_iter().zip(self.transmission.unit()))

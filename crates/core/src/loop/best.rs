@@ -241,10 +241,8 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
                 &Bounds {
                     gain: dofs.map(|dof| dof.free_gain.min(dof.gain_limit)),
                     width_limit: settings.safety.width_limit,
-                    step: settings
-                        .safety
-                        .command_speed
-                        .map(|speed| speed * settings.control.period),
+                    speed: settings.safety.command_speed,
+                    period: settings.control.period,
                     offsets: limits,
                 },
             )?,

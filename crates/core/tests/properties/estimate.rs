@@ -238,7 +238,8 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
     let bounds = Bounds {
         gain: [5.0],
         width_limit: [2.0 * UNIT],
-        step: [0.2 * UNIT],
+        speed: [40.0 * UNIT],
+        period: 0.005,
         offsets: [PlayLimit::new(3.0 * UNIT, 2.0 * UNIT).unwrap()],
     };
     let own = settings(&safety()).law;

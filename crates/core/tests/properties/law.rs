@@ -2,13 +2,15 @@
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;
+use crate::law::direction::Direction;
 use crate::law::settings::LawSettings;
-use crate::law::vector_law::{Bounds, VectorLaw};
+use crate::law::vector_law::{ACCELERATION, Bounds, VectorLaw};
 use crate::model::plays::{COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, product};
 
 use super::guarantees::Random;
 use super::support::{safety, settings};
 
+const PERIOD: f64 = 0.005;
 /// Excess that the law's search in a few steps may leave of the bound of the predicted tip.
 const SEARCH: f64 = 0.01;
 
@@ -21,6 +23,8 @@ struct Checked<const N: usize> {
     reference: [f64; N],
     share: f64,
     rows: [Row; N],
+    /// |dc| - |du| of each group in the last tick, 0 or above.
+    surplus: [f64; N],
     /// Largest speed of the predicted tip over its bound.
     fastest: f64,
     /// Ticks in which a command moved otherwise than the reference.
@@ -61,7 +65,8 @@ impl<const N: usize> Checked<N> {
         let bounds = Bounds {
             gain,
             width_limit: unit.map(|unit| unit * random.within(1.0, 3.0)),
-            step: unit.map(|unit| unit * random.within(0.05, 0.2)),
+            speed: unit.map(|unit| unit * random.within(0.05, 0.2) / PERIOD),
+            period: PERIOD,
             offsets: unit.map(|unit| PlayLimit::new(2.0 * unit, 1.5 * unit).unwrap()),
         };
         let mut checked = Self {
@@ -72,6 +77,7 @@ impl<const N: usize> Checked<N> {
             reference: [0.0; N],
             share: 1.0,
             rows: [[0.0; COEFFICIENTS]; N],
+            surplus: [0.0; N],
             fastest: 0.0,
             compensated: 0,
         };
@@ -128,11 +134,12 @@ impl<const N: usize> Checked<N> {
         }
         for dof in 0..N {
             let (dc, du) = (proposed[dof] - before[dof], reference[dof] - last[dof]);
+            let step = self.bounds.speed[dof] * PERIOD;
             // A share of the compensation leaves the reference's own motion.
             let most = if self.share < 1.0 {
-                self.bounds.step[dof].max(du.abs() * (1.0 + 1e-9))
+                step.max(du.abs() * (1.0 + 1e-9))
             } else {
-                self.bounds.step[dof]
+                step
             };
             let has_gain = self.bounds.gain.iter().all(|gain| *gain > 1.0);
             let rounding = 4.0 * f64::EPSILON * before[dof].abs();
@@ -144,7 +151,7 @@ impl<const N: usize> Checked<N> {
         }
     }
 
-    fn check_group(&self, group: usize, last: [f64; N], before: [f64; N], after: [f64; N]) {
+    fn check_group(&mut self, group: usize, last: [f64; N], before: [f64; N], after: [f64; N]) {
         let members = self.transmission.friction().members(group);
         let own = || (0..N).filter(|dof| members[*dof]);
         let minus = |a: [f64; N], b: [f64; N]| core::array::from_fn(|dof| a[dof] - b[dof]);
@@ -165,6 +172,11 @@ impl<const N: usize> Checked<N> {
             norm(dc) <= gain * norm(du) * (1.0 + 1e-12) + rounding,
             "{facts}"
         );
+        let surplus = norm(dc) - norm(du);
+        if self.share >= 1.0 {
+            let most = self.surplus[group] + ACCELERATION * PERIOD * PERIOD;
+            assert!(surplus <= most + rounding, "{facts}: {surplus} {most}");
+        }
         let product = self.dot(members, dc, du);
         assert!(product >= -rounding * norm(du), "{facts}: {product}");
         if gain <= 1.0 {
@@ -177,6 +189,11 @@ impl<const N: usize> Checked<N> {
                 assert!(within.contains(&after[dof]), "{facts}");
             }
         }
+        self.surplus[group] = if self.share >= 1.0 {
+            surplus.max(0.0)
+        } else {
+            f64::INFINITY
+        };
     }
 
     /// |dq| <= `tip_gain` |du|, and q does not pass u.
@@ -312,7 +329,8 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
     let bounds = Bounds {
         gain: [5.0],
         width_limit: [10.0],
-        step: [1.0],
+        speed: [f64::MAX],
+        period: PERIOD,
         offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
     };
     let mut law = VectorLaw::new(own, transmission, &bounds).unwrap();
@@ -349,4 +367,21 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
         let least = 0.5 / (rate * travel);
         assert!(f64::from(ticks) >= least, "{ticks} {least}");
     }
+}
+
+/// One DOF: 1 - travel / length after a reversal, -1 at most; two of one friction: of length 1 in a steady motion.
+#[test]
+fn a_reversal_turns_the_direction_within_twice_the_length_of_the_string() {
+    let mut alone = Direction::new(Friction::independent(), [2.0], 0.1);
+    alone.step([5.0]);
+    for (back, expected) in [(0.1, 0.5), (0.1, 0.0), (0.3, -1.0), (-0.1, -0.5)] {
+        alone.step([-back]);
+        let [found] = alone.value();
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+    let friction = Friction::new([0, 0], [1.0, 0.5]).unwrap();
+    let mut shared = Direction::new(friction, [1.0, 1.0], 0.1);
+    shared.step([30.0, 80.0]);
+    let [first, second] = shared.value();
+    assert!((first - 0.6).abs() < 0.01 && (second - 0.8).abs() < 0.01);
 }

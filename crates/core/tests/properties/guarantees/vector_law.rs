@@ -32,7 +32,8 @@ impl CheckedLaw {
         let bounds = Bounds {
             gain: dofs().map(|dof| dof.free_gain),
             width_limit,
-            step: settings.safety.command_speed.map(|speed| speed * PERIOD),
+            speed: settings.safety.command_speed,
+            period: PERIOD,
             offsets: [0, 1, 2].map(|dof| {
                 PlayLimit::new(width_limit[dof], settings.safety.offset_limit[dof]).unwrap()
             }),
