@@ -20,7 +20,7 @@ const EARLY: f64 = 2.0;
 /// Distance from the origin, in units, at which a change of the gain counts as one of the tip.
 const FAR: f64 = 2.0;
 /// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
-const START: f64 = 5.0;
+const START: f64 = 7.0;
 /// Largest rate at which the command's speed grows beyond the reference's, in `width_limit` / s^2: a tremor, which reverses
 /// ten times a second, must not drive the motors across the slack each time.
 pub(crate) const ACCELERATION: f64 = 40.0;
@@ -209,7 +209,7 @@ impl<const N: usize> VectorLaw<N> {
             let members = self.transmission.friction().members(group);
             let gain = self.gain.get(group).copied().unwrap_or(1.0);
             let own = only(members, moved);
-            if own == [0.0; N] {
+            if own.iter().all(|own| *own == 0.0) {
                 continue;
             }
             let has_turned = dot([1.0; N], only(members, before), direction) < 0.0;
