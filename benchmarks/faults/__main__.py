@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common.doc_pages import insert
 from faults import tables
 from faults.campaign import PAGE, Options, arguments, measure, read
+from faults.scenarios import DURATION
 
 
 def main() -> None:
@@ -28,11 +29,12 @@ def main() -> None:
     for name, rows in found.items():
         if name[:1] == "-":
             continue
-        shown = tables.beyond(rows) if name else tables.table(rows)
+        is_long = options.longest != DURATION[1]
+        shown = tables.beyond(rows) if name or is_long else tables.table(rows)
         text = f"{tables.summary(rows)} {tables.goals(options.profile)}\n\n{shown}"
         print(f"{name or 'guarded'}: {text}\n")
         if options.write:
-            title = f"faults {name or 'guarded'}"
+            title = f"faults {'long' if is_long else name or 'guarded'}"
             insert(PAGE, title, f"{conditions(options, name)}\n\n{text}")
     if each_off:
         text = tables.off_table(each_off)
@@ -51,7 +53,9 @@ def conditions(options: Options, name: str) -> str:
         "unguarded": "All detectors off",
         "each": "One detector off in turn",
     }
-    return f"{monitors.get(name, name + ' off')}, profile `{options.profile}`, {today}."
+    monitor = monitors.get(name, name + " off")
+    durations = f"transient faults of {DURATION[0]:g} to {options.longest:g} s"
+    return f"{monitor}, profile `{options.profile}`, {durations}, {today}."
 
 
 if __name__ == "__main__":

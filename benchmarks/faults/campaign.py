@@ -13,6 +13,7 @@ from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from faults import tables
 from faults.runs import run_seed, run_with_each_off
+from faults.scenarios import DURATION, OBSERVED_AFTER, OBSERVED_PERMANENT
 from tautscope.commands.progress import progress_bar
 from tautscope.config import Profile
 from tautscope.loop.safety import DETECTORS
@@ -49,6 +50,12 @@ def arguments() -> Options:
         default="",
         help='detectors that are off, separated by commas; "each": each in turn; "all": all',
     )
+    parser.add_argument(
+        "--longest",
+        type=float,
+        default=DURATION[1],
+        help="longest transient fault, 6 at most, not with --off each [%(default)s s]",
+    )
     parser.add_argument("--shard", default="1/1", metavar="I/N", help="part I of N of the seeds")
     add_arguments(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="save a row for every run")
@@ -58,14 +65,25 @@ def arguments() -> Options:
     parser.add_argument(
         "--write", action="store_true", help=f"update the tables of {PAGE.relative_to(ROOT)}"
     )
-    return parser.parse_args()
+    options = parser.parse_args()
+    if not DURATION[0] < options.longest <= OBSERVED_PERMANENT - OBSERVED_AFTER:
+        parser.error("--longest: above 0.1, 6 at most")
+    if options.off == "each" and options.longest != DURATION[1]:
+        parser.error("--longest is not for --off each")
+    return options
 
 
 def measure(options: Options) -> Found:
     """Run a campaign; Ctrl-C ends it with the seeds that are finished."""
     runs = options.runs or (DETECTOR_RUNS if options.off == "each" else RUNS)
     seeds, kinds = select_seeds(options, runs), options.kind or list(KINDS)
-    simulate = partial(rows_of_seed, kinds=kinds, profile=options.profile, off=options.off)
+    simulate = partial(
+        rows_of_seed,
+        kinds=kinds,
+        profile=options.profile,
+        off=options.off,
+        longest=options.longest,
+    )
     if len(seeds) == 1:
         return simulate(seeds[0])
     found: dict[int, Found] = {}
@@ -88,7 +106,9 @@ def select_seeds(options: Options, runs: int) -> list[int]:
     return list(range(options.first_seed, options.first_seed + count))[part - 1 :: parts]
 
 
-def rows_of_seed(seed: int, *, kinds: Sequence[str], profile: Profile, off: str) -> Found:
+def rows_of_seed(
+    seed: int, *, kinds: Sequence[str], profile: Profile, off: str, longest: float
+) -> Found:
     """Return the rows of one seed."""
     if off == "each":
         outcomes = run_with_each_off(seed, kinds, profile)
@@ -96,7 +116,7 @@ def rows_of_seed(seed: int, *, kinds: Sequence[str], profile: Profile, off: str)
     else:
         names = DETECTORS if off == "all" else tuple(filter(None, off.split(",")))
         name = "unguarded" if off == "all" else off
-        found = {name: run_seed(seed, kinds, profile, names)}
+        found = {name: run_seed(seed, kinds, profile, names, longest)}
     return {name: [tables.to_row(run, profile) for run in runs] for name, runs in found.items()}
 
 

@@ -61,12 +61,12 @@ class Instrument:
         self._plan: Generator[Callable[[], None], Traces, None] | None = None
         self._pipe: int | None = None
 
-    def run_faults(self, kinds: Sequence[str]) -> list[Outcome]:
-        """Run each kind of fault, all from the state after the estimation."""
+    def run_faults(self, kinds: Sequence[str], longest: float) -> list[Outcome]:
+        """Run each kind of fault, `longest` at most, all from the state after the estimation."""
         if not kinds:
             return []
         outcomes: list[Outcome] = []
-        self._plan = self._plan_forks(kinds, outcomes)
+        self._plan = self._plan_forks(kinds, longest, outcomes)
         try:
             answer = True, self.run()
         except _AllForksFinishedError:
@@ -112,12 +112,12 @@ class Instrument:
         return self._twin.time
 
     def _plan_forks(
-        self, kinds: Sequence[str], outcomes: list[Outcome]
+        self, kinds: Sequence[str], longest: float, outcomes: list[Outcome]
     ) -> Generator[Callable[[], None], Traces, None]:
         """Yield what each fork does first, and receive its traces."""
         nominal = yield lambda: None
         for kind in kinds:
-            fault = scenarios.draw_fault(kind, self._seed, self._start)
+            fault = scenarios.draw_fault(kind, self._seed, self._start, longest)
             base, envelope, reported = nominal, None, None
             if kind in evaluation.INPUT_PAUSED:
                 base = yield partial(self._pause, fault)

@@ -9,7 +9,7 @@ import numpy as np
 from faults.evaluation import Outcome, Traces, evaluate_run
 from faults.instrument import Instrument
 from faults.recorder import RunRecorder
-from faults.scenarios import START_KINDS, build_config, draw_fault, with_start_values
+from faults.scenarios import DURATION, START_KINDS, build_config, draw_fault, with_start_values
 from tautscope.config import Config, Profile
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import DETECTORS, Reaction
@@ -17,13 +17,17 @@ from tautscope.twin.faults import Fault
 
 
 def run_seed(
-    seed: int, kinds: Sequence[str], profile: Profile = "best", off: tuple[str, ...] = ()
+    seed: int,
+    kinds: Sequence[str],
+    profile: Profile = "best",
+    off: tuple[str, ...] = (),
+    longest: float = DURATION[1],
 ) -> list[Outcome]:
-    """Run each kind of fault with one seed."""
+    """Run each kind of fault with one seed; transient ones last `longest` at most [s]."""
     config = build_config(seed, profile, off)
     outcomes = run_start_faults(config, seed, [kind for kind in kinds if kind in START_KINDS])
     later = [kind for kind in kinds if kind not in START_KINDS]
-    return outcomes + (Instrument(config, seed, off).run_faults(later) if later else [])
+    return outcomes + (Instrument(config, seed, off).run_faults(later, longest) if later else [])
 
 
 def run_with_each_off(

@@ -49,12 +49,12 @@ def moving_dofs(seed: int) -> tuple[Dof, ...]:
     return tuple(Dof) if seed % 2 else (Dof.INSERTION,)
 
 
-def draw_fault(kind: str, seed: int, start: float) -> Fault:
-    """Draw duration, DOF and severity of a fault."""
+def draw_fault(kind: str, seed: int, start: float, longest: float = DURATION[1]) -> Fault:
+    """Draw duration, at most `longest` if transient, DOF and severity of a fault."""
     row = KINDS[kind]
     rng = np.random.default_rng([seed, 7, *kind.encode()])
     is_transient = row.has_duration and rng.uniform() < TRANSIENT_SHARE
-    duration = float(rng.uniform(*DURATION)) if is_transient else math.inf
+    duration = float(rng.uniform(DURATION[0], longest)) if is_transient else math.inf
     dof = Dof(int(rng.choice(moving_dofs(seed))))
     low, high = row.severity
     if low > 0 and high / low > LOGARITHMIC:

@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -178,6 +179,17 @@ def test_drawn_faults_are_repeatable_and_cover_durations_and_dofs(kind):
     transient = sum(math.isfinite(each.duration) for each in drawn)
     assert transient == 0 if not KINDS[kind].has_duration else 50 < transient < 90, "seeds 0 to 99"
     assert {each.dof for each in drawn} == set(Dof)
+
+
+def test_longer_faults_are_the_same_but_for_their_durations():
+    usual = [scenarios.draw_fault("noisy", seed, 10.0) for seed in range(50)]
+    longer = [scenarios.draw_fault("noisy", seed, 10.0, 6.0) for seed in range(50)]
+    assert [replace(each, duration=1.0) for each in usual] == [
+        replace(each, duration=1.0) for each in longer
+    ]
+    durations = [each.duration for each in longer if math.isfinite(each.duration)]
+    assert 5 < max(durations) <= 6
+    assert max(each.duration for each in usual if math.isfinite(each.duration)) <= 2
 
 
 def test_recorder_keeps_the_highest_reaction_and_the_stop():
