@@ -15,7 +15,7 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     tip_gain: Gain = 2.0
     """Largest speed of the predicted tip over that of the reference."""
-    direction_travel: Positive = 0.1
+    direction_travel: Positive = 0.02
     """Half of the travel of the reference in which its direction reverses."""
     change_rate: Positive = 0.01
     """Largest lasting change of the contact offsets and of the predicted tip, per travel of the

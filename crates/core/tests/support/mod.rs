@@ -109,7 +109,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         safety: *safety,
         law: LawSettings {
             tip_gain: 1.85,
-            direction_travel: 0.1,
+            direction_travel: 0.02,
             change_rate: 0.01,
         },
         estimation: EstimateSettings {
