@@ -138,8 +138,11 @@ def with_controls(page: str) -> str:
     for name, response in hazards(page):
         for file in control_files(name, response):
             found.setdefault(file, []).append(name)
-    lines = ["| file | controls of |", "|---|---|"]
-    lines += [f"| `{file}` | {', '.join(found[file])} |" for file in sorted(found)]
+    folders: dict[str, list[str]] = {}
+    for file in sorted(found):
+        folder, _, name = file.rpartition("/")
+        folders.setdefault(folder, []).append(f"`{name}` {', '.join(found[file])}")
+    lines = [f"- `{folder}`: {'; '.join(files)}" for folder, files in folders.items()]
     before, rest = page.split("<!-- controls: begin -->\n")
     after = rest.partition("<!-- controls: end -->")[2]
     table = "\n".join(lines)
