@@ -45,11 +45,12 @@ SHORT = {
 }
 """Words of a range -> how the page writes them."""
 LAST = """
-## Detection and simulation in detail
+## Settings of algorithms
 
-`tautscope config` prints units, limits and meaning of these keys.
+`tautscope config` prints units, limits and meaning of these keys of law and filter
+([best.md](best.md)), marker detection and simulation.
 """
-INTERNAL = ("vision.", "twin.")
+INTERNAL = ("law", "estimation", "vision", "twin.")
 """Sections whose keys have names only: whoever sets them reads `tautscope config`."""
 
 

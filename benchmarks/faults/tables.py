@@ -72,7 +72,7 @@ def seeds(rows: Sequence[Row]) -> str:
 def table(rows: Sequence[Row]) -> str:
     """Return a line per kind: what it is, worst excursions, detection, and the usual reaction."""
     lines = [
-        "| fault, hazard | what it is | beyond (SILENT) | transient: worst [mm, rad, rad] "
+        "| fault, hazard | what it is | beyond (SILENT) | transient: worst [mm] "
         "| permanent: worst | detected, median of the time [s] | mostly |",
         "|---|---|--:|---|---|---|---|",
     ]
@@ -98,10 +98,7 @@ def _cells(own: Sequence[Row]) -> list[Any]:
 
 
 def _excursion(rows: Sequence[Row]) -> str:
-    if not rows:
-        return ""
-    worst = np.array([row["excursion"] for row in rows]).max(axis=0)
-    return f"{1e3 * worst[0]:.2f}, {worst[1]:.2f}, {worst[2]:.2f}"
+    return f"{_worst(rows):.2f}" if rows else ""
 
 
 def beyond(rows: Sequence[Row]) -> str:

@@ -19,6 +19,14 @@ POINTS = 0.03
 """Largest distance of the worst seed from the median for a share to count as steady."""
 
 
+WITHOUT_GOAL = (
+    "operator: tracking error",
+    "operator: bound of the reduction",
+    "disturbed operator: largest error",
+)
+"""Quantities in the table of the page that have no goal; `--json` has all."""
+
+
 def pair(by_seed: Values) -> Values:
     """Add the ratios of profile `best` to profile `paper`, seed by seed."""
     ratios = {}
@@ -112,7 +120,7 @@ def plain(rows: Sequence[Row]) -> str:
 
 
 def full(rows: Sequence[Row]) -> str:
-    """Return a Markdown table: a line per quantity with the values of its DOFs."""
+    """Return a Markdown table: a line per quantity with a goal, or of `WITHOUT_GOAL`."""
     cells: dict[str, dict[str, list[Row]]] = {}
     for row in rows:
         cells.setdefault(row["what"], {}).setdefault(row["profile"], []).append(row)
@@ -124,12 +132,15 @@ def full(rows: Sequence[Row]) -> str:
         }
     lines = ["| what | `best` | `paper` | goal |", "|---|---|---|---|"]
     for what, mine in cells.items():
+        goals = _goals(mine.get("best", ()))
+        if not goals and what not in WITHOUT_GOAL:
+            continue
         shown = [_triple(mine.get(name, ())) for name in ("best", "paper")]
         units = {
             unit: None for row in next(iter(mine.values())) if (unit := row["unit"]) != "share"
         }
         title = what + (f" [{', '.join(units)}]" if units else "")
-        lines.append(f"| {title} | {shown[0]} | {shown[1]} | {_goals(mine.get('best', ()))} |")
+        lines.append(f"| {title} | {shown[0]} | {shown[1]} | {goals} |")
     return "\n".join(lines)
 
 
