@@ -48,9 +48,10 @@ LAST = """
 ## Settings of algorithms
 
 `tautscope config` prints units, limits and meaning of these keys of law and filter
-([best.md](best.md)), marker detection and simulation.
+([best.md](best.md)), marker detection and simulation,
+and of `tautscope calibrate`.
 """
-INTERNAL = ("law", "estimation", "vision", "twin.")
+INTERNAL = ("law", "estimation", "vision", "twin", "calibration")
 """Sections whose keys have names only: whoever sets them reads `tautscope config`."""
 
 

@@ -70,17 +70,17 @@ def seeds(rows: Sequence[Row]) -> str:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return a line per kind: what it is, worst excursions, detection, and the usual reaction."""
+    """Return a line per kind: severities, worst excursions, detection, and the usual reaction."""
     lines = [
-        "| fault, hazard | what it is | beyond (SILENT) | transient: worst [mm] "
+        "| fault, hazard | severity | beyond (SILENT) | transient: worst [mm] "
         "| permanent: worst | detected, median of the time [s] | mostly |",
         "|---|---|--:|---|---|---|---|",
     ]
     for name, kind in KINDS.items():
         if own := [row for row in rows if row["kind"] == name]:
             low, high = kind.severity
-            what = kind.what + (f": {low:g} to {high:g} {kind.unit}" if kind.unit else "")
-            cells = (f"{name} {kind.hazard}".strip(), what, *_cells(own))
+            severity = f"{low:g} to {high:g} {kind.unit}" if kind.unit else ""
+            cells = (f"{name} {kind.hazard}".strip(), severity, *_cells(own))
             lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
