@@ -70,18 +70,27 @@ def seeds(rows: Sequence[Row]) -> str:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return a line per kind: severities, worst excursions, detection, and the usual reaction."""
+    """Return a line per kind with runs beyond the goal, and then the other kinds in short."""
     lines = [
         "| fault, hazard | severity | beyond (SILENT) | transient: worst [mm] "
         "| permanent: worst | detected, median of the time [s] | mostly |",
         "|---|---|--:|---|---|---|---|",
     ]
+    within = []
     for name, kind in KINDS.items():
-        if own := [row for row in rows if row["kind"] == name]:
+        own = [row for row in rows if row["kind"] == name]
+        title = f"{name} {kind.hazard}".strip()
+        if any(row["beyond"] or row["ending"] == "SILENT" for row in own):
             low, high = kind.severity
             severity = f"{low:g} to {high:g} {kind.unit}" if kind.unit else ""
-            cells = (f"{name} {kind.hazard}".strip(), severity, *_cells(own))
+            cells = (title, severity, *_cells(own))
             lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+        elif own:
+            found = sum(row["detected"] is not None for row in own)
+            within.append(f"{title} ({_worst(own):.2f}, {found})")
+    if within:
+        text = "No run is beyond the goal (worst excursion in mm, detected)"
+        lines += ["", f"{text}: {', '.join(within)}."]
     return "\n".join(lines)
 
 
