@@ -24,7 +24,7 @@ A line whose comment has the word REPLACE is a placeholder: `tautscope run` refu
 `tautscope doctor` lists it.
 
 After the default come unit and limits; without limits, a number has to be above 0. "any" is any
-number, "3 x" three values of the kind. In
+number, "3 x" three values of the kind, DOF the unit of the degree of freedom, m or rad. In
 {ranged}
 a number without an upper limit may be from a {factor:.0f}th to {factor:.0f} times its default:
 robots differ by less, and a wrong unit, which would switch a limit off, is more.
@@ -47,12 +47,12 @@ SHORT = {
 LAST = """
 ## Settings of algorithms
 
-`tautscope config` prints units, limits and meaning of these keys of law and filter
+`tautscope config` prints the keys, with units, limits and meaning, of law and filter
 ([best.md](best.md)), marker detection and simulation,
 and of `tautscope calibrate`.
 """
 INTERNAL = ("law", "estimation", "vision", "twin", "calibration")
-"""Sections whose keys have names only: whoever sets them reads `tautscope config`."""
+"""Sections without their keys: whoever sets them reads `tautscope config`."""
 
 
 def page() -> str:
@@ -68,8 +68,7 @@ def page() -> str:
     internal = []
     for path, section in all_sections():
         if path.startswith(INTERNAL):
-            names = ", ".join(f"`{key.name}`" for key in keys(section))
-            internal.append(f"- `[{path}]`: {section_text(section).splitlines()[0]} {names}")
+            internal.append(f"- `[{path}]`: {section_text(section).splitlines()[0]}")
             continue
         title = f"`[{path}]`" if path else "Top level"
         parts.append(f"\n## {title}\n")
@@ -94,7 +93,7 @@ def _row(path: str, key: Key) -> str:
     limits = limits.removeprefix("whole, ") if is_whole else limits
     limits = "" if re.fullmatch(r"(\d x )?> 0", limits) else limits
     limits = f"of {limits}" if limits.startswith('"') else limits
-    value = f"{_default(key, _value(path, key.name))} {key.unit}".strip()
+    value = f"{_default(key, _value(path, key.name))} {key.unit.replace('m or rad', 'DOF')}".strip()
     cells = (
         f"`{key.name}`",
         ", ".join(filter(None, (value, limits))),

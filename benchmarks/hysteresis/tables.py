@@ -130,12 +130,12 @@ def full(rows: Sequence[Row]) -> str:
         cells[f"{len(every)} image conditions: largest change of reduction"] = {
             "best": [max(own, key=_distance) for own in zip(*every, strict=True)]
         }
-    lines = ["| what | `best` | `paper` | goal |", "|---|---|---|---|"]
+    lines = ["| what | `best` | `paper`, median | goal |", "|---|---|---|---|"]
     for what, mine in cells.items():
         goals = _goals(mine.get("best", ()))
         if not goals and what not in WITHOUT_GOAL:
             continue
-        shown = [_triple(mine.get(name, ())) for name in ("best", "paper")]
+        shown = [_triple(mine.get("best", ())), _triple(mine.get("paper", ()), has_worst=False)]
         units = {
             unit: None for row in next(iter(mine.values())) if (unit := row["unit"]) != "share"
         }
@@ -148,13 +148,14 @@ def _distance(row: Row) -> float:
     return float("inf") if row["median"] is None else row["median"]
 
 
-def _triple(rows: Sequence[Row]) -> str:
+def _triple(rows: Sequence[Row], has_worst: bool = True) -> str:
     """Medians and worst values of the DOFs of a quantity."""
     median_, worst = (
         " / ".join(show(row[key], row["unit"]).removesuffix(" %") for row in rows)
         for key in ("median", "worst")
     )
-    return f"{median_} ({worst})" + (" %" if rows[0]["unit"] == "share" else "") if rows else ""
+    spread = f"{median_} ({worst})" if has_worst else median_
+    return spread + (" %" if rows[0]["unit"] == "share" else "") if rows else ""
 
 
 def _goals(rows: Sequence[Row]) -> str:

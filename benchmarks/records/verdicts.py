@@ -54,13 +54,15 @@ JUDGEMENTS = {
         "unknown",
         "timid: a person would suspect a slack of 5 mm",
     ),
-    "continuum pair13 opp, axis 2": ("unknown", "as axis 1"),
+    "continuum pair13 opp, axis 2": ("unknown", "timid: as axis 1"),
     "continuum pair23 same, axis 1": ("unknown", "an S, which is named"),
     "continuum pair23 same, axis 2": ("unknown", "an S, which is named"),
     "continuum pair23 opp, axis 1": ("unknown", "the tip moves while this axis rests"),
     "continuum pair23 opp, axis 2": ("unknown", "the gain differs between both sides"),
 }
 """By record: what the verdict said when it was read, and the judgement of the reader."""
+OBJECTIONS = ("timid", "wrong")
+"""Beginnings of the judgements of a verdict that is not simply right."""
 
 
 @dataclass(frozen=True)
@@ -111,12 +113,13 @@ def _answer(verdict: Verdict) -> Answer:
 
 
 def table(found: dict[str, Answer]) -> str:
-    """Markdown: a row per record."""
-    lines = ["| record | says | slack | judgement |", "|---|---|---|---|"]
+    """Markdown: a row per record, with a judgement that is not simply "right"."""
+    lines = ["| record | says | slack, or why there is none |", "|---|---|---|"]
     for name, each in found.items():
         said, judgement = JUDGEMENTS.get(name, ("", ""))
-        text = judgement if said == each.says else "**to be read**: the verdict has changed"
-        lines.append(f"| {name} | {each.says} | {each.slack} | {text} |")
+        text = judgement if judgement.startswith(OBJECTIONS) else ""
+        text = text if said == each.says else "**to be read**: the verdict has changed"
+        lines.append(f"| {name} | {each.says} | {each.slack}{text and '; '}{text} |")
     counts = (f"{sum(each.says == says for each in found.values())} {says}" for says in SAYS)
     listed = ", ".join(counts)
     return "\n".join([*lines, "", f"{len(found)} records: {listed}."])
