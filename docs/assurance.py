@@ -125,8 +125,7 @@ Each brings dependencies of its own; `uv tree --no-dev` lists them. Python itsel
 
 ## Rust crates in the extension module
 
-`crates/core`, the loop, needs `libm` and `nalgebra` alone. Crates that only generate code at build
-time are marked."""
+`crates/core`, the loop, needs `libm` and `nalgebra` alone."""
 
 
 def with_controls(page: str) -> str:

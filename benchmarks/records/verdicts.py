@@ -28,7 +28,7 @@ JUDGEMENTS = {
     ),
     "tool4_roll1_run000": (
         "unknown",
-        "timid: a loop of 3°, half of which is called a delay; two speeds are needed",
+        "timid: a loop of 3°, half of which is called a delay, at one speed",
     ),
     "tool4_roll3_run000": ("unknown", "timid: as roll1"),
     "tool4_roll5_run000": ("slack", "the upper end is rounder than the lower one"),
@@ -113,13 +113,16 @@ def _answer(verdict: Verdict) -> Answer:
 
 
 def table(found: dict[str, Answer]) -> str:
-    """Markdown: a row per record, with a judgement that is not simply "right"."""
-    lines = ["| record | says | slack, or why there is none |", "|---|---|---|"]
-    for name, each in found.items():
-        said, judgement = JUDGEMENTS.get(name, ("", ""))
-        text = judgement if judgement.startswith(OBJECTIONS) else ""
-        text = text if said == each.says else "**to be read**: the verdict has changed"
-        lines.append(f"| {name} | {each.says} | {each.slack}{text and '; '}{text} |")
-    counts = (f"{sum(each.says == says for each in found.values())} {says}" for says in SAYS)
-    listed = ", ".join(counts)
-    return "\n".join([*lines, "", f"{len(found)} records: {listed}."])
+    """Markdown: the records of each verdict, with judgements that are not simply right."""
+    lines = []
+    for says in SAYS:
+        cells = []
+        for name, each in found.items():
+            said, judgement = JUDGEMENTS.get(name, ("", ""))
+            text = f" ({judgement})" if judgement.startswith(OBJECTIONS) else ""
+            text = text if said == each.says else " (**to be read**: the verdict has changed)"
+            if each.says == says:
+                cells.append(f"{name}: {each.slack}{text}")
+        if cells:
+            lines.append(f"- **{says}**, {len(cells)}: {'; '.join(cells)}")
+    return "\n".join(lines)
