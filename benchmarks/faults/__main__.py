@@ -32,9 +32,7 @@ def main() -> None:
         is_long = options.longest != DURATION[1]
         shown = tables.beyond(rows) if name or is_long else tables.table(rows)
         goals = "" if name else f" {tables.goals(options.profile)}"
-        text = f"{tables.summary(rows)}{goals}
-
-{shown}"
+        text = f"{tables.summary(rows)}{goals}\n\n{shown}"
         print(f"{name or 'guarded'}: {text}\n")
         if options.write:
             title = f"faults {'long' if is_long else name or 'guarded'}"
