@@ -125,11 +125,7 @@ Each brings dependencies of its own; `uv tree --no-dev` lists them. Python itsel
 
 ## Rust crates in the extension module
 
-`crates/core`, the loop, needs `libm` and `nalgebra` alone. Crates that only generate code at build
-time are marked.
-
-| crate | version | licence | |
-|---|---|---|---|"""
+`crates/core`, the loop, needs `libm` and `nalgebra` alone."""
 
 
 def with_controls(page: str) -> str:
@@ -138,8 +134,11 @@ def with_controls(page: str) -> str:
     for name, response in hazards(page):
         for file in control_files(name, response):
             found.setdefault(file, []).append(name)
-    lines = ["| file | controls of |", "|---|---|"]
-    lines += [f"| `{file}` | {', '.join(found[file])} |" for file in sorted(found)]
+    folders: dict[str, list[str]] = {}
+    for file in sorted(found):
+        folder, _, name = file.rpartition("/")
+        folders.setdefault(folder, []).append(f"`{name}` {', '.join(found[file])}")
+    lines = [f"- `{folder}`: {'; '.join(files)}" for folder, files in folders.items()]
     before, rest = page.split("<!-- controls: begin -->\n")
     after = rest.partition("<!-- controls: end -->")[2]
     table = "\n".join(lines)
@@ -169,7 +168,7 @@ def control_files(hazard: str, response: str) -> list[str]:
 
 def soup() -> str:
     """docs/soup.md: the libraries of others that a user runs."""
-    lines = [SOUP, *python_rows(), CRATES, *crate_rows()]
+    lines = [SOUP, *python_rows(), CRATES, "", *crate_rows()]
     return "\n".join(lines) + "\n"
 
 
@@ -211,7 +210,7 @@ def python_licence(name: str) -> str:
 
 
 def crate_rows() -> Iterator[str]:
-    """A row for each crate that the extension module is built of."""
+    """The crates that the extension module is built of, a line per licence and use."""
     command = ["cargo", "tree", "--package=tautscope-bindings", "--edges=normal", "--target=all"]
     shown = ["--prefix=depth", "--format= {p}\t{l}", "--no-dedupe", "--locked", "--offline"]
     lines = subprocess.run(
@@ -225,12 +224,16 @@ def crate_rows() -> Iterator[str]:
         if int(depth) <= generator:
             generator = int(depth) if "(proc-macro)" in marks else math.inf
         is_linked = generator == math.inf
-        key = name, version.removeprefix("v")
-        found[key] = licence, is_linked or found.get(key, ("", False))[1]
+        crate = name, version.removeprefix("v")
+        found[crate] = licence, is_linked or found.get(crate, ("", False))[1]
+    groups: dict[tuple[bool, str], list[str]] = {}
     for (name, version), (licence, is_linked) in sorted(found.items()):
         if not name.startswith("tautscope"):
-            mark = "" if is_linked else "at build time"
-            yield f"| {name} | {version} | {licence.replace('/', ' OR ')} | {mark} |"
+            key = not is_linked, licence.replace("/", " OR ")
+            groups.setdefault(key, []).append(f"{name} {version}")
+    for (is_generator, licence), names in sorted(groups.items()):
+        use = ", to generate code at build time" if is_generator else ""
+        yield f"- {licence}{use}: {', '.join(names)}"
 
 
 if __name__ == "__main__":

@@ -20,18 +20,15 @@ HEAD = """# Configuration
 {package}
 
 `tautscope config` prints the default with these explanations, and with `--config rig.toml` yours.
-`Config(profile="nope")` in Python raises the same `ConfigError` as a file that
-`tautscope.load_config` reads. A line whose comment has the word REPLACE is a placeholder:
-`tautscope run` refuses it, `tautscope doctor` lists it. `uv run docs/configuration.py` writes this
-page.
+A line whose comment has the word REPLACE is a placeholder: `tautscope run` refuses it,
+`tautscope doctor` lists it.
 
-"Allowed" is empty where every value of the default's type is; "3 x" is three values of the kind.
-
-In {ranged}
-a number that has no upper limit below may be from a {factor:.0f}th to {factor:.0f} times its
-default: robots differ by less, and a wrong unit or a digit too many, which would switch a limit
-off, is more. `[safety] unusual = ["safety.stall"]` allows any value for the keys that it names;
-every report names them.
+After the default come unit and limits; without limits, a number has to be above 0. "any" is any
+number, "3 x" three values of the kind, DOF the unit of the degree of freedom, m or rad. In
+{ranged}
+a number without an upper limit may be from a {factor:.0f}th to {factor:.0f} times its default:
+robots differ by less, and a wrong unit, which would switch a limit off, is more.
+`[safety] unusual = ["safety.stall"]` allows any value for the keys that it names.
 """
 SHORT = {
     r"a number (from|above|below|of)": r"\1",
@@ -41,10 +38,20 @@ SHORT = {
     r"below ": "< ",
     r"of at least ": ">= ",
     r"of at most ": "<= ",
-    r"(\d) values, each a number(?= and a|$)": r"\1 numbers",
+    r"(\d) values, each a number(?= and a|$)": r"\1 x any",
     r"(\d) values, each": r"\1 x",
+    r"a (list|table), each (item|value) a text$": "texts",
+    r" or (?=\")": ", ",
 }
 """Words of a range -> how the page writes them."""
+LAST = """
+## Settings of algorithms
+
+`tautscope config` prints the keys, with units, limits and meaning, of marker detection and simulation,
+and of `tautscope calibrate`.
+"""
+INTERNAL = ("vision", "twin", "calibration")
+"""Sections without their keys: whoever sets them reads `tautscope config`."""
 
 
 def page() -> str:
@@ -57,7 +64,11 @@ def page() -> str:
         )
     ]
     described: set[object] = set()
+    internal = []
     for path, section in all_sections():
+        if path.startswith(INTERNAL):
+            internal.append(f"- `[{path}]`: {section_text(section).splitlines()[0]}")
+            continue
         title = f"`[{path}]`" if path else "Top level"
         parts.append(f"\n## {title}\n")
         if section in described:
@@ -68,18 +79,23 @@ def page() -> str:
         parts.append(f"{section_text(section)}\n")
         rows = [key for key in keys(section) if key.section is None]
         if rows:
-            parts.append("| key | default | allowed [unit] | meaning |\n|---|---|---|---|")
+            parts.append("| key | default | meaning |\n|---|---|---|")
             parts += [_row(path, key) for key in rows]
             parts.append("")
-    return "\n".join(parts)
+    return "\n".join([*parts, LAST, *internal, ""])
 
 
 def _row(path: str, key: Key) -> str:
     unit = f" [{key.unit}]" if key.unit else ""
+    limits = short_range(key.allowed)
+    is_whole = isinstance(_value(path, key.name), int)
+    limits = limits.removeprefix("whole, ") if is_whole else limits
+    limits = "" if re.fullmatch(r"(\d x )?> 0", limits) else limits
+    limits = f"of {limits}" if limits.startswith('"') else limits
+    value = f"{_default(key, _value(path, key.name))} {key.unit.replace('m or rad', 'DOF')}".strip()
     cells = (
         f"`{key.name}`",
-        _default(key, _value(path, key.name)),
-        f"{short_range(key.allowed)}{unit}".strip(),
+        ", ".join(filter(None, (value, limits))),
         key.text.removeprefix(f"{unit[1:]}; ").replace(unit, "", 1),
     )
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
@@ -87,8 +103,10 @@ def _row(path: str, key: Key) -> str:
 
 def short_range(allowed: str) -> str:
     """A range in symbols: ``> 0`` for ``a number above 0``; empty for a whole type."""
-    if allowed in ("a number", "a text", "true or false", "a table"):
+    if allowed in ("a text", "true or false", "a table"):
         return ""
+    if allowed == "a number":
+        return "any"
     for words, symbols in SHORT.items():
         allowed = re.sub(words, symbols, allowed)
     return allowed

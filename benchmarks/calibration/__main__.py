@@ -71,12 +71,10 @@ def measure(options: argparse.Namespace) -> dict[int, Outcome]:
 def report(options: argparse.Namespace, found: dict[int, Outcome]) -> str:
     """The tables with their conditions, as Markdown."""
     outcomes = list(found.values())
-    source = "images" if options.images else "true features with 0.5 px of noise"
-    scale = ", measured distance of the bands" if options.band_distance else ""
-    parts = [
-        f"Instrument `{options.instrument}`, seeds {min(found)} to {max(found)}, {source}{scale}.",
-        error_table(outcomes),
-    ]
+    source = "images" if options.images else "features"
+    scale = ", measured band distance" if options.band_distance else ""
+    title = f"{options.instrument}, seeds {min(found)} to {max(found)}, {source}{scale}"
+    parts = [error_table(title, outcomes)]
     if options.loop:
         parts.append(loop_table([each for each in outcomes if each.hand]))
     if options.alarms:

@@ -8,26 +8,24 @@ import numpy as np
 from calibration.evaluation import Outcome, column
 from tautscope.dof import Dof
 
+LOW = 0.9
+"""Share of the truths in their 95 % intervals below which a parameter is named."""
 
-def error_table(outcomes: Sequence[Outcome]) -> str:
-    """Median and worst error of each quantity, and the share of images with both bands."""
-    lines = ["| error | median | 90th percentile | worst |", "|---|--:|--:|--:|"]
-    for name in outcomes[0].errors:
-        sizes = np.abs([each.errors[name] for each in outcomes]).round(9)
-        values = np.median(sizes), np.percentile(sizes, 90), sizes.max()
-        lines.append(f"| {name} | " + " | ".join(f"{value:.2g}" for value in values) + " |")
-    first, last = np.array([each.found for each in outcomes]).T
+
+def error_table(title: str, outcomes: Sequence[Outcome]) -> str:
+    """Median and worst error of each quantity, and whether its interval holds the truth."""
+    names = list(outcomes[0].errors)
+    sizes = np.abs([[each.errors[name] for name in names] for each in outcomes]).round(9)
+    errors = zip(np.median(sizes, axis=0), sizes.max(axis=0), strict=True)
     plausible = sum(each.is_plausible for each in outcomes)
-    seconds = [each.seconds for each in outcomes]
-    lines += [
-        "",
-        f"Plausible: {plausible} of {len(outcomes)}. Truth in the 95 % interval: "
-        f"{coverage(outcomes):.0%} ({_coverages(outcomes)}). Both bands in {np.median(first):.0%} "
-        f"of the images (least {first.min():.0%}), at last in {np.median(last):.0%} (least "
-        f"{last.min():.0%}). Fit: {np.median(seconds):.1f} s, at most {max(seconds):.1f} s of "
-        "processor time.",
-    ]
-    return "\n".join(lines)
+    cells = (
+        title,
+        *(f"{median:.2g} ({worst:.2g})" for median, worst in errors),
+        f"{plausible} of {len(outcomes)}",
+        f"{coverage(outcomes):.0%}{_low_coverages(outcomes)}",
+    )
+    head = ("instrument", *names, "plausible", "truths in their intervals")
+    return f"| {' | '.join(head)} |\n|{'---|' * len(head)}\n| {' | '.join(cells)} |"
 
 
 def coverage(outcomes: Sequence[Outcome]) -> float:
@@ -35,10 +33,11 @@ def coverage(outcomes: Sequence[Outcome]) -> float:
     return float(np.mean([list(each.inside.values()) for each in outcomes]))
 
 
-def _coverages(outcomes: Sequence[Outcome]) -> str:
+def _low_coverages(outcomes: Sequence[Outcome]) -> str:
     names = outcomes[0].inside
     shares = {name: np.mean([each.inside[name] for each in outcomes]) for name in names}
-    return ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
+    low = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share < LOW)
+    return f" ({low})" if low else ""
 
 
 def loop_table(outcomes: Sequence[Outcome]) -> str:

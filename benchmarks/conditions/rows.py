@@ -92,18 +92,19 @@ def to_rows(frames: Sequence[Evaluation]) -> list[dict[str, Any]]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return a Markdown table: a line per condition, both modes side by side."""
+    """Return a Markdown table: both modes of each condition that misses a goal, and of all."""
     lines = [
-        "| condition | visible | valid [%] | wrong accepted [%] | error [px] "
+        "| condition | valid [%] | wrong accepted [%] | error [px] "
         "| without prediction: valid | wrong accepted | error |",
-        "|---|" + "--:|" * 7,
+        "|---|" + "--:|" * 6,
     ]
+    held = []
     for profile in (*CONDITIONS, "all"):
         own = {row["what"]: row for row in rows if row["profile"] == profile}
-        if not own:
+        if profile != "all" and all(row["holds"] for row in own.values()):
+            held += [profile] * bool(own)
             continue
-        some = next(iter(own.values()))
-        cells = [profile, str(some["n_visible"])]
+        cells = [profile]
         for label in MODES:
             for what, form in (
                 ("valid", ".1f"),
@@ -114,4 +115,6 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
                 mark = "" if row is None or row["holds"] else " (!)"
                 cells.append("-" if row is None else f"{row['pooled']:{form}}{mark}")
         lines.append("| " + " | ".join(cells) + " |")
+    if held:
+        lines += ["", f"Every goal is held with {', '.join(held)}."]
     return "\n".join(lines)

@@ -31,7 +31,8 @@ def main() -> None:
             continue
         is_long = options.longest != DURATION[1]
         shown = tables.beyond(rows) if name or is_long else tables.table(rows)
-        text = f"{tables.summary(rows)} {tables.goals(options.profile)}\n\n{shown}"
+        goals = "" if name else f" {tables.goals(options.profile)}"
+        text = f"{tables.summary(rows)}{goals}\n\n{shown}"
         print(f"{name or 'guarded'}: {text}\n")
         if options.write:
             title = f"faults {'long' if is_long else name or 'guarded'}"

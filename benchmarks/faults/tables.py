@@ -70,18 +70,27 @@ def seeds(rows: Sequence[Row]) -> str:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return a line per kind: what it is, worst excursions, detection, and what the loop did."""
+    """Return a line per kind with runs beyond the goal, and then the other kinds in short."""
     lines = [
-        "| fault, hazard | what it is | beyond (SILENT) | transient: worst [mm, rad, rad] "
-        "| permanent: worst | detected, median of the time [s] | highest reactions |",
+        "| fault, hazard | severity | beyond (SILENT) | transient: worst [mm] "
+        "| permanent: worst | detected, median of the time [s] | mostly |",
         "|---|---|--:|---|---|---|---|",
     ]
+    within = []
     for name, kind in KINDS.items():
-        if own := [row for row in rows if row["kind"] == name]:
+        own = [row for row in rows if row["kind"] == name]
+        title = f"{name} {kind.hazard}".strip()
+        if any(row["beyond"] or row["ending"] == "SILENT" for row in own):
             low, high = kind.severity
-            what = kind.what + (f": {low:g} to {high:g} {kind.unit}" if kind.unit else "")
-            cells = (f"{name} {kind.hazard}".strip(), what, *_cells(own))
+            severity = f"{low:g} to {high:g} {kind.unit}" if kind.unit else ""
+            cells = (title, severity, *_cells(own))
             lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+        elif own:
+            found = sum(row["detected"] is not None for row in own)
+            within.append(f"{title} ({_worst(own):.2f}, {found})")
+    if within:
+        text = "No run is beyond the goal (worst excursion in mm, detected)"
+        lines += ["", f"{text}: {', '.join(within)}."]
     return "\n".join(lines)
 
 
@@ -93,15 +102,12 @@ def _cells(own: Sequence[Row]) -> list[Any]:
         f"{sum(row['beyond'] for row in own) or ''}{f' ({silent})' if silent else ''}",
         *(_excursion(part) for part in by_duration(own)),
         f"{len(times)}, {np.median(times):.2f}" if times else "0",
-        ", ".join(f"{name} {count}" for name, count in reached.most_common(2)),
+        next((name for name, _ in reached.most_common(1)), ""),
     ]
 
 
 def _excursion(rows: Sequence[Row]) -> str:
-    if not rows:
-        return ""
-    worst = np.array([row["excursion"] for row in rows]).max(axis=0)
-    return f"{1e3 * worst[0]:.2f}, {worst[1]:.2f}, {worst[2]:.2f}"
+    return f"{_worst(rows):.2f}" if rows else ""
 
 
 def beyond(rows: Sequence[Row]) -> str:

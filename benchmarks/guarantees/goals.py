@@ -95,9 +95,7 @@ def write(found: Mapping[str, Measurement]) -> None:
 
 def table(found: Mapping[str, Measurement]) -> str:
     """Return the table of all goals; those that were not measured keep their results."""
-    head = (
-        "| | goal | target | result | N | k | seeds | measured |\n|---|---|---|---|---|---|---|---|"
-    )
+    head = "| | goal | target | result | N (seeds) | k | measured |\n|---|---|---|---|---|---|---|"
     page = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
     old = {line.split("|")[1].strip(): line for line in page.splitlines() if line[:3] == "| G"}
     return "\n".join([head, *(_row(goal, found.get(goal.name), old) for goal in GOALS)])
@@ -107,8 +105,9 @@ def _row(goal: Goal, measured: Measurement | None, old: Mapping[str, str]) -> st
     start = f"| {goal.name} | {goal.what} | {goal.target} |"
     if measured is None:
         before = old.get(goal.name, "")
-        cells = before.split("|")[4:-1] if before else [" not measured ", *[" "] * 4]
+        cells = before.split("|")[4:-1] if before else [" not measured ", *[" "] * 3]
         return start + "|".join(cells) + "|"
     today = datetime.now(UTC).date().isoformat()
     k = f"{measured.failures}, missed" if measured.failures else "0"
-    return f"{start} {measured.text} | {measured.runs} | {k} | {measured.seeds} | {today} |"
+    runs = measured.runs + (f" ({measured.seeds})" if measured.seeds else "")
+    return f"{start} {measured.text} | {runs} | {k} | {today} |"

@@ -67,7 +67,7 @@ def summarise(everyone: list[str], now: dict[str, str], earlier: dict[str, str])
     if old := sum(name not in now for name in known):
         text += f"; {old} of them tested before other files changed"
     if rest := sorted({_file(name) for name in everyone if name not in known}):
-        text += f"; of {len(everyone)}, not yet all of {', '.join(map(_base, rest))}"
+        text += f"; of {len(everyone)}, not yet all of {len(rest)} files"
     return Measurement(text, str(len(known)), len(missed))
 
 
@@ -139,7 +139,3 @@ def _place(mutant: str) -> tuple[str, str]:
 
 def _file(mutant: str) -> str:
     return mutant.partition(":")[0]
-
-
-def _base(file: str) -> str:
-    return Path(file).name

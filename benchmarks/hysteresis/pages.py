@@ -19,7 +19,7 @@ def write_tables(rows: Sequence[Row], drawn: Sequence[str], conditions: str) -> 
     """Write the table of the page, and its figures."""
     insert(PAGE, "hysteresis", f"{conditions} (worst) of {DOFS}.\n\n{full(rows)}")
     folder = FOLDER.relative_to(PAGE.parent).as_posix()
-    images = [f"![{FIGURES[name][1]}]({folder}/{name}.png)" for name in drawn]
+    images = [f"![{name}]({folder}/{name}.png)" for name in drawn]
     captions = [f"*{FIGURES[name][1]}.*" for name in drawn]
     parts = [text for pair in zip(images, captions, strict=True) for text in pair]
     insert(PAGE, "figures", "\n\n".join(parts))

@@ -19,6 +19,14 @@ POINTS = 0.03
 """Largest distance of the worst seed from the median for a share to count as steady."""
 
 
+WITHOUT_GOAL = (
+    "operator: tracking error",
+    "operator: bound of the reduction",
+    "disturbed operator: largest error",
+)
+"""Quantities in the table of the page that have no goal; `--json` has all."""
+
+
 def pair(by_seed: Values) -> Values:
     """Add the ratios of profile `best` to profile `paper`, seed by seed."""
     ratios = {}
@@ -112,7 +120,7 @@ def plain(rows: Sequence[Row]) -> str:
 
 
 def full(rows: Sequence[Row]) -> str:
-    """Return a Markdown table: a line per quantity with the values of its DOFs."""
+    """Return a Markdown table: a line per quantity with a goal, or of `WITHOUT_GOAL`."""
     cells: dict[str, dict[str, list[Row]]] = {}
     for row in rows:
         cells.setdefault(row["what"], {}).setdefault(row["profile"], []).append(row)
@@ -122,14 +130,17 @@ def full(rows: Sequence[Row]) -> str:
         cells[f"{len(every)} image conditions: largest change of reduction"] = {
             "best": [max(own, key=_distance) for own in zip(*every, strict=True)]
         }
-    lines = ["| what | `best` | `paper` | goal |", "|---|---|---|---|"]
+    lines = ["| what | `best` | `paper`, median | goal |", "|---|---|---|---|"]
     for what, mine in cells.items():
-        shown = [_triple(mine.get(name, ())) for name in ("best", "paper")]
+        goals = _goals(mine.get("best", ()))
+        if not goals and what not in WITHOUT_GOAL:
+            continue
+        shown = [_triple(mine.get("best", ())), _triple(mine.get("paper", ()), has_worst=False)]
         units = {
             unit: None for row in next(iter(mine.values())) if (unit := row["unit"]) != "share"
         }
         title = what + (f" [{', '.join(units)}]" if units else "")
-        lines.append(f"| {title} | {shown[0]} | {shown[1]} | {_goals(mine.get('best', ()))} |")
+        lines.append(f"| {title} | {shown[0]} | {shown[1]} | {goals} |")
     return "\n".join(lines)
 
 
@@ -137,13 +148,14 @@ def _distance(row: Row) -> float:
     return float("inf") if row["median"] is None else row["median"]
 
 
-def _triple(rows: Sequence[Row]) -> str:
+def _triple(rows: Sequence[Row], has_worst: bool = True) -> str:
     """Medians and worst values of the DOFs of a quantity."""
     median_, worst = (
         " / ".join(show(row[key], row["unit"]).removesuffix(" %") for row in rows)
         for key in ("median", "worst")
     )
-    return f"{median_} ({worst})" + (" %" if rows[0]["unit"] == "share" else "") if rows else ""
+    spread = f"{median_} ({worst})" if has_worst else median_
+    return spread + (" %" if rows[0]["unit"] == "share" else "") if rows else ""
 
 
 def _goals(rows: Sequence[Row]) -> str:

@@ -43,9 +43,9 @@ def explain(rows: list[Row], motion: Motion) -> str:
         importance = permutation_importance(
             forest, values, reduction, n_repeats=5, random_state=0
         ).importances_mean
-        lines = [f"{dof.label}: reduction in percent, most important properties"]
-        for k in np.argsort(-importance)[:SHOWN]:
-            rank = spearmanr(values[:, k], reduction).statistic
-            lines.append(f"  {labels[k]:<28} {importance[k]:.2f}  rank correlation {rank:+.2f}")
-        parts.append("\n".join(lines))
-    return "\n\n".join(parts)
+        shown = [
+            f"{labels[k]} {importance[k]:.2f} ({spearmanr(values[:, k], reduction).statistic:+.2f})"
+            for k in np.argsort(-importance)[:SHOWN]
+        ]
+        parts.append(f"{dof.label}: {', '.join(shown)}")
+    return "\n".join(parts)

@@ -78,8 +78,8 @@ TABLE = (
     Property("told centre x", -5.0, 5.0, "px", "principal point", True),
     Property("told centre y", -5.0, 5.0, "px", "principal point", True),
     Property("told section", -5.0, 5.0, "%", "length of the section", True),
-    Property("told band A", -0.5, 0.5, "mm", "position of band A", True),
-    Property("told band B", -0.5, 0.5, "mm", "position of band B", True),
+    Property("told band A", -0.5, 0.5, "mm", "position of the band", True),
+    Property("told band B", -0.5, 0.5, "mm", "position of the band", True),
 )
 
 
@@ -187,7 +187,14 @@ def _told(values: dict[str, float], actual: Config, axis: Floats, direction: Flo
 
 
 def markdown_table() -> str:
-    """The ranges as a Markdown table."""
-    lines = ["| property | range | unit | what |", "|---|--:|---|---|"]
-    lines += [f"| {p.name} | {p.low:g} to {p.high:g} | {p.unit} | {p.what} |" for p in TABLE]
+    """The ranges as a Markdown table, properties that differ in their last word in one row."""
+    found: dict[tuple[float, float, str, str], list[str]] = {}
+    for p in TABLE:
+        found.setdefault((p.low, p.high, p.unit, p.what), []).append(p.name)
+    lines = ["| property | range | what |", "|---|--:|---|"]
+    for (low, high, unit, what), (first, *others) in found.items():
+        names = ", ".join([first, *(name.rpartition(" ")[2] for name in others)])
+        lines.append(
+            f"| {names} | {low:g} to {high:g} {unit.removesuffix('1')}".rstrip() + f" | {what} |"
+        )
     return "\n".join(lines)

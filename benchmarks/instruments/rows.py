@@ -128,33 +128,32 @@ def table(rows: list[Row], motion: Motion) -> str:
     """Return a Markdown table of all variants for one motion."""
     best, paper = (reductions(rows, motion, name) for name in ("best", "paper"))
     lines = [
-        "| variant | DOF | median | 5th percentile | worst (seed) | worse than none "
-        "| worse than paper by 3 points | shift | images not used |",
-        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
+        "| variant | median | 5th percentile | worst (seed) | worse than none "
+        "| worse than paper by 3 points | shift [mm, rad] | images not used |",
+        "|---|--:|--:|--:|--:|--:|--:|--:|",
     ]
     seeds = [row["seed"] for row in rows if row["motion"] == motion]
     for variant in ("paper", "best", "best exact"):
-        found = reductions(rows, motion, variant)
+        mine = 100 * reductions(rows, motion, variant)
+        if not len(mine):
+            continue
         shares = refused_shares(rows, motion, variant)
-        shift = median_shift(rows, motion, variant) if len(found) else np.zeros(3)
-        for dof in Dof if len(found) else ():
-            mine = 100 * found[:, dof]
-            worse = "-"
-            if variant != "paper" and len(paper):
-                margin = 100 * (paper[:, dof] - MARGIN)
-                worse = f"{(mine < margin).sum()}"
-            cells = (
-                variant,
-                dof.label,
-                f"{np.median(mine):.0f} %",
-                f"{np.percentile(mine, LOW):.0f} %",
-                f"{mine.min():.0f} % ({seeds[int(mine.argmin())]})",
-                f"{(mine < 0).sum()}",
-                worse,
-                f"{dof.display_scale * shift[dof]:.2g} {dof.display_unit}",
-                f"{100 * shares.mean():.1f} %" if dof is Dof.INSERTION and len(shares) else "",
-            )
-            lines.append(f"| {' | '.join(cells)} |")
+        shift = [dof.display_scale for dof in Dof] * median_shift(rows, motion, variant)
+        is_compared = variant != "paper" and len(paper)
+        worse = (mine < 100 * (paper - MARGIN)).sum(axis=0) if is_compared else ()
+        cells = (
+            variant,
+            " / ".join(f"{each:.0f}" for each in np.median(mine, axis=0)) + " %",
+            " / ".join(f"{each:.0f}" for each in np.percentile(mine, LOW, axis=0)) + " %",
+            " / ".join(
+                f"{mine[at, dof]:.0f} ({seeds[at]})" for dof, at in enumerate(mine.argmin(axis=0))
+            ),
+            " / ".join(map(str, (mine < 0).sum(axis=0))),
+            " / ".join(map(str, worse)),
+            " / ".join(f"{each:.2g}" for each in shift),
+            f"{100 * shares.mean():.1f} %" if len(shares) else "",
+        )
+        lines.append(f"| {' | '.join(cells)} |")
     exact = reductions(rows, motion, "best exact")
     if len(exact) and len(best):
         lost = 100 * (exact - best)

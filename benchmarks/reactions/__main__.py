@@ -20,15 +20,19 @@ _RUNG = re.compile(r"\((\w+), (\w+)\)")
 
 
 def table() -> str:
-    """Return the table, a line per flag."""
+    """Return the table, a line for all flags with the same reactions."""
     source = SOURCE.read_text(encoding="utf-8")
     ladders = dict(_LADDER.findall(source))
-    lines = ["| flag | detected at | reactions, and what ends each |", "|---|---|---|"]
+    found: dict[tuple[str, str], list[str]] = {}
     for flag, source_tick, ladder, climbs in _RULE.findall(source):
         rungs = _RUNG.findall(ladders.get(ladder, ladder))
         joint = ", then " if climbs == "true" else ", or "
         steps = joint.join(f"{snake(what)} ({snake(end)})" for what, end in rungs)
-        lines.append(f"| {snake(flag)} | {snake(source_tick)} | {steps} |")
+        found.setdefault((snake(source_tick), steps), []).append(snake(flag))
+    lines = ["| flags | detected at | reactions, and what ends each |", "|---|---|---|"]
+    lines += [
+        f"| {', '.join(flags)} | {tick} | {steps} |" for (tick, steps), flags in found.items()
+    ]
     return "\n".join(lines)
 
 

@@ -69,20 +69,29 @@ def _rows(name: str, found: list[list[Result]]) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Markdown: ratios per record or family, then a line per horizon over all of them."""
-    names = dict.fromkeys(row["record"] for row in rows)
+    """Markdown: ratios per group of records or family, then a line per horizon over all."""
 
     def of(quantity: str, key: str, value: Any) -> list[dict[str, Any]]:
         return [row for row in rows if row["quantity"] == quantity and row[key] == value]
 
     shares = " | ".join(f"{100 * share:.0f} %" for share in HORIZONS)
     lines = [f"| record or family | {shares} |", f"|---|{'--:|' * len(HORIZONS)}"]
-    for name in names:
+    groups: dict[str, list[str]] = {}
+    for name in dict.fromkeys(row["record"] for row in rows):
+        groups.setdefault(loop.group(name), []).append(name)
+    for title, names in groups.items():
+        ratios = [of("ratio to the best other model", "record", name) for name in names]
         cells = [
-            f"{row['median']:.2f}" + (f" ({row['worst']:.2f})" if row["n"] > 1 else "")
-            for row in of("ratio to the best other model", "record", name)
+            f"{np.median([row['median'] for row in each]):.2f}"
+            + (
+                f" ({max(row['worst'] for row in each):.2f})"
+                if len(each) * each[0]["n"] > 1
+                else ""
+            )
+            for each in zip(*ratios, strict=True)
         ]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
+        number = f", {len(names)}" if len(names) > 1 else ""
+        lines.append(f"| {title}{number} | {' | '.join(cells)} |")
     for share in HORIZONS:
         own = of("ratio to the best other model", "horizon", share)
         held = sum(row["holds"] for row in own)

@@ -90,33 +90,37 @@ def to_rows(
 
 
 def table(found: Mapping[str, Errors], rows: Sequence[dict[str, Any]]) -> str:
-    """Markdown: per record the ratios to the trivial predictors and an error, then the medians."""
+    """Markdown: ratios to the better trivial predictor and to the mixture, and an error."""
+    columns = range(len(HORIZONS))
     shares = " | ".join(f"{100 * share:.0f} %" for share in HORIZONS)
     lines = [
-        f"| record | {shares} | error at {100 * SHOWN:.0f} % |",
+        f"| median (worst) | {shares} | error at {100 * SHOWN:.0f} % |",
         f"|---|{'--:|' * (len(HORIZONS) + 1)}",
     ]
-    shown = HORIZONS.index(SHOWN)
+    groups: dict[str, list[Errors]] = {}
     for name, errors in found.items():
-        cells = [f"{trivial_ratio(errors, at):.2f}" for at in range(len(HORIZONS))]
-        cells.append(f"{errors[FILTER][shown]:.3g}")
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    for row in rows:
-        if row["record"] != "records":
-            continue
-        verdict = "holds" if row["holds"] else "missed"
-        lines += [
-            "",
-            f"At {100 * row['horizon']:.0f} %: {row['quantity']}: {_summary(row)}; "
-            f"goal {row['goal']:g} {verdict}.",
-        ]
-    for at, share in enumerate(HORIZONS):
-        behind = sum(trivial_ratio(errors, at) > 1 for errors in found.values())
-        lines += ["", f"At {100 * share:.0f} %, worse than trivial: {behind} of {len(found)}."]
+        groups.setdefault(group(name), []).append(errors)
+    for name, each in groups.items():
+        cells = [spread([trivial_ratio(errors, at) for errors in each]) for at in columns]
+        cells.append(spread([errors[FILTER][HORIZONS.index(SHOWN)] for errors in each], ".3g"))
+        lines.append(f"| {name}, {len(each)} | {' | '.join(cells)} |")
+    for what in ("filter over the mixture", "filter over the baseline's"):
+        own = [row for row in rows if row["record"] == "records" and row["quantity"] == what]
+        if own:
+            cells = [f"{row['median']:.2f} ({row['worst']:.2f})" for row in own]
+            lines.append(f"| all, {what} | {' | '.join(cells)} | |")
+    behind = [sum(trivial_ratio(each, at) > 1 for each in found.values()) for at in columns]
+    lines.append(f"| worse than trivial | {' | '.join(map(str, behind))} | |")
     return "\n".join(lines)
 
 
-def _summary(row: dict[str, Any]) -> str:
-    if row["n"] == 1:
-        return f"{row['median']:.2f}"
-    return f"median of {row['n']} {row['median']:.2f}, largest {row['worst']:.2f}"
+def group(name: str) -> str:
+    """The kind of a record: tools, rolls of a tool, the continuum robot, or itself."""
+    kinds = {"tool": "tools", "rolls": "rolls", "continuum": "continuum robot"}
+    return next((kind for start, kind in kinds.items() if name.startswith(start)), name)
+
+
+def spread(values: Sequence[float], digits: str = ".2f") -> str:
+    """Median, and of several values the largest."""
+    worst = f" ({max(values):{digits}})" if len(values) > 1 else ""
+    return f"{np.median(values):{digits}}{worst}"

@@ -12,54 +12,57 @@ from tautscope.analysis.slide import slide
 from tautscope.analysis.verdict import Verdict, judge
 from tautscope.runs.records import Cleaning, Record
 
+LAG = "a lag without slack explains the record as well"
 JUDGEMENTS = {
     "tool4_L4_run00": (
         "unknown",
-        "right: four strokes, of which the first ends 2° lower. The verdict does not name this",
+        "four strokes, of which the first ends 2° lower. The verdict does not name this",
     ),
-    "tool4_L4_run14": ("slack", "right: the width of the loop in the figure"),
-    "tool4_L4_run23": ("slack", "right, as run14"),
-    "tool4_L4_run41": ("slack", "right; rounded ends"),
-    "tool4_R5_run10": ("slack", "right: sharp corners, the widest loop"),
+    "tool4_L4_run14": ("slack", "the width of the loop in the figure"),
+    "tool4_L4_run23": ("slack", "as run14"),
+    "tool4_L4_run41": ("slack", "rounded ends"),
+    "tool4_R5_run10": ("slack", "sharp corners, the widest loop"),
     "tool4_pitch2_run000": (
         "slack",
-        "right for these strokes; of the loop, 3°, 0.8° are called a delay, at one speed",
+        "of the loop, 3°, 0.8° are called a delay, at one speed",
     ),
     "tool4_roll1_run000": (
         "unknown",
-        "right, but timid: a loop of 3°, half of which is called a delay; two speeds are needed",
+        "timid: a loop of 3°, half of which is called a delay, at one speed",
     ),
-    "tool4_roll3_run000": ("unknown", "right, but timid: as roll1"),
-    "tool4_roll5_run000": ("slack", "right; the upper end is rounder than the lower one"),
-    "continuum seg1, axis 1": ("no slack", "right: a line, slightly bent, which is named"),
-    "continuum seg1, axis 2": ("unknown", "right: the other axis moves the tip by more than slack"),
-    "continuum seg2, axis 1": ("no slack", "right: a line"),
-    "continuum seg2, axis 2": ("unknown", "right, as seg1, axis 2"),
-    "continuum seg3, axis 1": ("unknown", "right: loops to both sides, from the other axis"),
-    "continuum seg3, axis 2": ("unknown", "right: loops of all sizes, few strokes"),
+    "tool4_roll3_run000": ("unknown", "timid: as roll1"),
+    "tool4_roll5_run000": ("slack", "the upper end is rounder than the lower one"),
+    "continuum seg1, axis 1": ("no slack", "a line, slightly bent, which is named"),
+    "continuum seg1, axis 2": ("unknown", "the other axis moves the tip by more than slack"),
+    "continuum seg2, axis 1": ("no slack", "a line"),
+    "continuum seg2, axis 2": ("unknown", "as seg1, axis 2"),
+    "continuum seg3, axis 1": ("unknown", "loops to both sides, from the other axis"),
+    "continuum seg3, axis 2": ("unknown", "loops of all sizes, few strokes"),
     "continuum pair12 same, axis 1": (
         "unknown",
-        "right: the line bends at both ends, which is named",
+        "the line bends at both ends, which is named",
     ),
     "continuum pair12 same, axis 2": (
         "no slack",
-        "right for slack; the tip turns back at the end of a stroke, by 40 mm: the other axis",
+        "the tip turns back at the end of a stroke, by 40 mm: the other axis",
     ),
-    "continuum pair12 opp, axis 1": ("unknown", "right: loops of 10 mm, from coupling or slack"),
-    "continuum pair12 opp, axis 2": ("unknown", "right, as axis 1"),
-    "continuum pair13 same, axis 1": ("unknown", "right: a fan, from the other axis"),
-    "continuum pair13 same, axis 2": ("unknown", "right: two lines, from the other axis"),
+    "continuum pair12 opp, axis 1": ("unknown", "loops of 10 mm, from coupling or slack"),
+    "continuum pair12 opp, axis 2": ("unknown", "as axis 1"),
+    "continuum pair13 same, axis 1": ("unknown", "a fan, from the other axis"),
+    "continuum pair13 same, axis 2": ("unknown", "two lines, from the other axis"),
     "continuum pair13 opp, axis 1": (
         "unknown",
-        "right at one speed, but timid: a person would suspect a slack of 5 mm",
+        "timid: a person would suspect a slack of 5 mm",
     ),
-    "continuum pair13 opp, axis 2": ("unknown", "right, as axis 1"),
-    "continuum pair23 same, axis 1": ("unknown", "right: an S, which is named"),
-    "continuum pair23 same, axis 2": ("unknown", "right: an S, which is named"),
-    "continuum pair23 opp, axis 1": ("unknown", "right: the tip moves while this axis rests"),
-    "continuum pair23 opp, axis 2": ("unknown", "right: the gain differs between both sides"),
+    "continuum pair13 opp, axis 2": ("unknown", "timid: as axis 1"),
+    "continuum pair23 same, axis 1": ("unknown", "an S, which is named"),
+    "continuum pair23 same, axis 2": ("unknown", "an S, which is named"),
+    "continuum pair23 opp, axis 1": ("unknown", "the tip moves while this axis rests"),
+    "continuum pair23 opp, axis 2": ("unknown", "the gain differs between both sides"),
 }
 """By record: what the verdict said when it was read, and the judgement of the reader."""
+OBJECTIONS = ("timid", "wrong")
+"""Beginnings of the judgements of a verdict that is not simply right."""
 
 
 @dataclass(frozen=True)
@@ -105,16 +108,21 @@ def _answer(verdict: Verdict) -> Answer:
     if found.is_aligned:
         limit = f"at most {found.width.high:.3g} {verdict.record.units[1]}"
         return Answer("no slack", limit, verdict.text)
-    return Answer("unknown", found.missing.partition(" (95 %")[0], verdict.text)
+    missing = found.missing.partition(" (95 %")[0].removeprefix("it is ")
+    return Answer("unknown", missing.replace(LAG, "or a lag"), verdict.text)
 
 
 def table(found: dict[str, Answer]) -> str:
-    """Markdown: a row per record."""
-    lines = ["| record | says | slack | judgement |", "|---|---|---|---|"]
-    for name, each in found.items():
-        said, judgement = JUDGEMENTS.get(name, ("", ""))
-        text = judgement if said == each.says else "**to be read**: the verdict has changed"
-        lines.append(f"| {name} | {each.says} | {each.slack} | {text} |")
-    counts = (f"{sum(each.says == says for each in found.values())} {says}" for says in SAYS)
-    listed = ", ".join(counts)
-    return "\n".join([*lines, "", f"{len(found)} records: {listed}."])
+    """Markdown: the records of each verdict, with judgements that are not simply right."""
+    lines = []
+    for says in SAYS:
+        cells = []
+        for name, each in found.items():
+            said, judgement = JUDGEMENTS.get(name, ("", ""))
+            text = f" ({judgement})" if judgement.startswith(OBJECTIONS) else ""
+            text = text if said == each.says else " (**to be read**: the verdict has changed)"
+            if each.says == says:
+                cells.append(f"{name}: {each.slack}{text}")
+        if cells:
+            lines.append(f"- **{says}**, {len(cells)}: {'; '.join(cells)}")
+    return "\n".join(lines)

@@ -65,7 +65,7 @@ def _quantities(
 def table(found: Mapping[Case, Outcome]) -> str:
     """Return a Markdown table: a line per case, each DOF of the seed with its largest ratio."""
     labels = " | ".join(f"{dof.label} [{dof.display_unit}]" for dof in Dof)
-    lines = [f"| case | {labels} | ratio | within 3 sigma |", "|---|--:|--:|--:|--:|--:|"]
+    lines = [f"| case | {labels} | ratio |", "|---|--:|--:|--:|--:|"]
     for name, outcomes in _by_name(found).items():
         cells = [name]
         for dof in Dof:
@@ -74,8 +74,10 @@ def table(found: Mapping[Case, Outcome]) -> str:
             cells.append(f"{errors[0]:.3g}, {errors[1:].max():.3g}")
         value = max(ratio(each, dof) for each in outcomes for dof in Dof)
         cells.append(f"{value:.2f}" + ("" if value <= RATIO_GOAL else " (missed)"))
-        shares = [share for each in outcomes for of in each.coverage.values() for share in of]
-        cells.append(f"{100 * min(shares):.0f} %" if shares else "-")
         lines.append(f"| {' | '.join(cells)} |")
     held = max(outcome.held for outcome in found.values())
-    return "\n".join([*lines, "", f"Held: at most {100 * held:.1f} % of the images of a case."])
+    shares = [share for each in found.values() for of in each.coverage.values() for share in of]
+    notes = [f"Held: at most {100 * held:.1f} % of the images of a case."]
+    if shares:
+        notes.append(f"Within 3 sigma: at least {100 * min(shares):.0f} % of the time.")
+    return "\n".join([*lines, "", " ".join(notes)])

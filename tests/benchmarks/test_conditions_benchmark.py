@@ -33,7 +33,12 @@ def test_rows_count_as_defined() -> None:
         if row["profile"] == "clean" and row["what"] == "marker error, with prediction"
     )
     assert rms == pytest.approx(np.sqrt(np.mean(np.square(errors))))
-    assert table(rows).count("\n") == 1 + len(names) + 1
+    shown = table(rows)
+    for name in names:
+        held = all(row["holds"] for row in rows if row["profile"] == name)
+        assert (f"| {name} |" in shown) != held
+        assert (name in shown.partition("Every goal is held with ")[2]) == held
+    assert "| all |" in shown
     # A detection without an instrument is wrong.
     wrong = Evaluation(
         "no instrument", 0, "procedural", 0, STATE, 0.0, (True, False), (np.full(2, np.inf),) * 2

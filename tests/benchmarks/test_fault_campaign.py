@@ -124,6 +124,14 @@ def test_verdicts(run, ending, beyond):
     assert (row["ending"], row["beyond"]) == (ending, beyond)
 
 
+def test_kinds_within_the_goal_are_listed_below_the_table():
+    rows = [tables.to_row(outcome((excursion, 0, 0), detected=0.1)) for excursion in (5e-4, 5e-3)]
+    rows[0]["kind"] = "late"
+    *_, row, empty, others = tables.table(rows).splitlines()
+    assert row.startswith("| frozen V7 |  | 1 | 5.00 |  | 1, 0.10 |") and not empty
+    assert others.endswith(": late V8 (0.50, 1).")
+
+
 def test_detectors_that_are_off_with_equal_figures_share_a_row():
     def rows(name, excursion):
         run = tables.to_row(outcome((excursion, 0, 0), duration=1.0))

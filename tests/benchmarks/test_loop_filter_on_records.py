@@ -29,8 +29,12 @@ def test_rows_compare_the_filter_with_the_better_trivial_predictor_and_the_mixtu
     before = rows["records, 3%: filter over the baseline's"]
     assert before["median"] == 0.5 and before["holds"] and before["n"] == 1
     shown = loop.table(found, list(rows.values()))
-    assert "| a | 0.50 | 0.50 | 0.50 | 1 |" in shown
-    assert "At 3 %, worse than trivial: 1 of 2." in shown
+    assert "| a, 1 | 0.50 | 0.50 | 0.50 | 1 |" in shown
+    assert "| all, filter over the mixture | 1.51 (2.00) | 1.51 (2.00) | 1.51 (2.00) | |" in shown
+    assert "| worse than trivial | 1 | 1 | 1 | |" in shown
+    assert "| tools, 2 | 0.76 (1.02) |" in loop.table(
+        {"tool_a": found["a"], "tool_b": found["b"]}, []
+    )
 
 
 def test_a_horizon_with_too_few_sights_has_no_row() -> None:

@@ -17,24 +17,23 @@ class ActuatorsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
     """Motors of a robot with [[dof]] that are not its degrees of freedom.
 
     Antagonistic pairs, coupled tendons, gears and signs: motor positions = matrix times command +
-    offsets. A rig then takes and reports the positions of the motors. Without this section it takes
-    the command.
+    offsets. A rig then takes and reports motor positions, else the command.
     """
 
     matrix: tuple[tuple[float, ...], ...] = ()
     """A row per motor: its motion over that of each degree of freedom."""
     offsets: tuple[float, ...] = ()
-    """Of each motor, its position at command 0; without it 0."""
+    """Position of each motor at command 0; else 0."""
     limits: tuple[tuple[float, float], ...] = ()
-    """Least and largest position of each motor; a command beyond them is followed as far as they
+    """Least and largest position of each motor; a command beyond is followed as far as they
     allow."""
     names: tuple[Name, ...] = ()
-    """Of the motors in messages; without it motor_1, motor_2, ..."""
+    """Names of the motors in messages; else motor_1, motor_2, ..."""
     units: tuple[str, ...] = ()
-    """Of the motors in messages, as mm, rad or counts."""
+    """Their units in messages, as mm, rad or counts."""
     map: str = ""
-    """In place of matrix and offsets: "module:function" of yours from the command to the motors, or
-    "module:Class" with the method motors(dofs) and, if motors are reported, dofs(motors)."""
+    """In place of matrix and offsets: "module:function" of yours from command to motors, or
+    "module:Class" with motors(dofs) and, if motors are reported, dofs(motors)."""
 
 
 @relation(ActuatorsConfig)

@@ -16,32 +16,31 @@ Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_
 class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One of 1 to 8 degrees of freedom of a robot that is not the article's instrument.
 
-    In the order of every array. With them, insertion, rotation, bending and the values per degree
-    of freedom in [safety] are not used.
+    In the order of every array; insertion, rotation, bending and their values in [safety] are then
+    not used.
     """
 
     name: Name
-    """Its name in traces, tables and messages: small letters, digits and underscores."""
+    """Its name in traces, tables and messages."""
     width_limit: Annotated[float, Meta(gt=0, le=100)]
-    """Largest width of the slack that is compensated, and the unit of its other lengths [m or
-    rad]."""
+    """Largest width of the slack that is compensated [m or rad]; unit of its other lengths."""
     unit: Literal["m", "rad"] = "rad"
     """Its unit in every array."""
     range: tuple[float, float] | None = None
-    """Least and largest command [m or rad]; without it 50 width_limit to both sides of 0."""
+    """Least and largest command [m or rad]; else 50 width_limit to both sides of 0."""
     speed: Annotated[float, Meta(gt=0, le=1000)] | None = None
-    """Largest speed of the reference that is followed [m or rad per s]; without it 2 width_limit
-    per s."""
+    """Largest speed of the reference that is followed [m or rad per s]; else 2 width_limit per
+    s."""
     friction: str = ""
-    """Degrees of freedom of one name share one friction, as a shaft that slides and turns in a
-    channel; without a name it has its own."""
+    """DOFs of one name share one friction, as a shaft that slides and turns in a channel; without a
+    name it has its own."""
     lever: Annotated[float, Meta(gt=0, le=100)] = 1.0
-    """Of one that shares a friction: motion of the surface that rubs, over its own [m/rad], 1 for
-    a translation."""
+    """Of one that shares a friction: motion of the rubbing surface over its own [m/rad], 1 for a
+    translation."""
     expected_width: Positive | None = None
-    """Width of the slack that is expected [m or rad]; without it two thirds of width_limit."""
+    """Width of the slack that is expected [m or rad]; else two thirds of width_limit."""
     gain_limit: Gain = 5.0
-    """K_b: command over reference while the slack is crossed, and the bound of every gain."""
+    """K_b: command over reference while the slack is crossed, and bound of every gain."""
     delta_minus: float = 0.0
     """Initial offset at the negative contact [m or rad]."""
     delta_plus: float = 0.0
@@ -78,20 +77,18 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     """Where the tip is in a state of the degrees of freedom of [[dof]]."""
 
     kind: str = "joints"
-    """"joints": the tip is measured degree by degree; "two_planes": a section of constant curvature
-    with the degrees of freedom bend_x, bend_y and, if there is one, insertion and rotation by their
-    names; "segments": sections of constant curvature in a row, two degrees of freedom each; or your
-    class as "module:Class"."""
+    """"joints": the tip is measured degree by degree; "two_planes": constant curvature with the
+    DOFs bend_x, bend_y, insertion and rotation, by name; "segments": two DOFs for each of several
+    in a row; or your class as "module:Class"."""
     length: Positive = 0.08
     """Of the bending section of "two_planes", or of each of "segments" [m]."""
     tip_length: Positive = 0.015
     """From its end to the sensor [m]."""
     without: tuple[Name, ...] = ()
-    """Degrees of freedom that do not move the tip, as of a gripper, with "two_planes" and
-    "segments"; a `Tip` of a further sensor measures them."""
+    """DOFs that do not move the tip, as of a gripper, with "two_planes" and "segments"; a `Tip` of
+    another sensor measures them."""
     skew: float = 0.0
-    """Of "two_planes": by how much more than a right angle the plane of bend_y is turned from that
-    of bend_x, about z [rad]."""
+    """Of "two_planes": angle from bend_x to bend_y about z, less a right angle [rad]."""
     base_position: Vector3 = (0.0, 0.0, 0.0)
     """Origin of the kinematics in the frame of the sensor that measures poses [m]."""
     base_rotation: Vector3 = (0.0, 0.0, 0.0)
@@ -104,21 +101,21 @@ class TopicConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True
     """A topic of ROS 2 with which a sensor of the tip measures."""
 
     name: str
-    """Name of the topic, relative to the node's namespace without a slash at its beginning."""
+    """Relative to the namespace without a slash at its beginning."""
     type: Literal["JointState", "PointStamped", "PoseStamped", "PoseWithCovarianceStamped"]
-    """Type of its messages: "JointState" measures degrees of freedom by their names, the others the
-    position of the tip and, but for "PointStamped", its orientation."""
+    """"JointState" measures DOFs by their names, the others the position of the tip and, but for
+    "PointStamped", its orientation."""
     frame: str = ""
-    """frame_id that its messages must have, in which the kinematics gives the tip; empty: that of
-    the first message."""
+    """frame_id of its messages, in which the kinematics gives the tip; empty: that of the first
+    message."""
 
 
 class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sensors of a robot with [[dof]]; deviations are of measurements without a covariance."""
 
     delays: Annotated[tuple[NonNegative, ...], Meta(max_length=4)] = ()
-    """How much earlier than its time stamps say each sensor measures [s];
-    `tautscope calibrate latency --rig` finds it."""
+    """How much earlier than its stamps say each sensor measures [s], by `tautscope calibrate
+    latency --rig`."""
 
     tip_deviation: Positive = 0.01
     """Of a tip that is measured degree by degree [in width_limit]."""

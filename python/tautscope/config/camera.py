@@ -21,35 +21,35 @@ class PoseConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
     """Origin of the guide in the camera frame: x right, y down, z forward [m] [ours]."""
     rotation: Vector3 = (0.32, -0.26, 0.0)
-    """Rotation vector, axis times angle [rad], from guide to camera coordinates; the guide's z axis
-    is the axis of the channel, outwards [ours]."""
+    """Rotation vector from guide to camera coordinates [rad]; the guide's z axis is that of the
+    channel, outwards [ours]."""
 
 
 class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The source of a camera's images, in FFmpeg's terms. All [ours]."""
 
     url: str = "/dev/video0"
-    """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph for lavfi."""
+    """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph of lavfi."""
     format: str | None = "v4l2"
-    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; None lets FFmpeg detect it."""
+    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; None lets it detect the format."""
     options: dict[str, str] = field(default_factory=dict)
-    """FFmpeg's options of the format: ``video_size``, ``framerate``, ``input_format``, ..."""
+    """FFmpeg's options: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"
-    """Deinterlacing: ``bwdif`` makes each field a frame, with a delay of one frame; ``always`` also
-    where the source does not say that it is interlaced."""
+    """``bwdif`` makes each field a frame, one frame late; ``always`` also where the source does not
+    say that it is interlaced."""
     clock: CameraClock = "stream"
-    """Capture time of a frame: ``stream``, its time stamp, mapped to our clock by the frame with
-    the lowest latency in `clock_window`; ``device``, its time stamp on the system's monotonic clock
-    (V4L2); ``arrival``, its arrival time, for a source without time stamps."""
+    """Capture time: ``stream``, the time stamp, mapped to our clock by the frame with the lowest
+    latency in `clock_window`; ``device``, that of V4L2 on the monotonic clock; ``arrival``, for a
+    source without stamps."""
     clock_window: Positive = 10.0
     """Window of ``clock = "stream"`` [s]."""
     delay: Annotated[float, Meta(ge=0, le=10)] = 0.0
-    """Time from exposure to time stamp for ``device``, otherwise lowest time from exposure to
-    arrival [s]; `tautscope calibrate geometry` measures it."""
+    """Time from exposure to stamp for ``device``, else lowest time from exposure to arrival [s], by
+    `tautscope calibrate geometry`."""
     timeout: Positive = 2.0
-    """Time without a frame after which the source is lost and opened again [s]."""
+    """Time without a frame after which the source is opened again [s]."""
     reconnect_period: Positive = 0.5
-    """Time between two attempts to open the source [s]."""
+    """Time between two attempts [s]."""
     start_timeout: Positive = 10.0
     """Time limit of the self-test at the start [s]."""
     lost_timeout: Positive = 5.0
@@ -66,8 +66,8 @@ class CameraConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     height: Annotated[int, Meta(ge=1, le=8192)] = 576
     """Height of the images [px], PAL DV [paper]."""
     pixel_format: PixelFormat = "bgr"
-    """Layout of the 8-bit pixels. The YUV formats are BT.601 with limited range and need an even
-    width, nv12 and i420 also an even height."""
+    """Layout of the 8-bit pixels. YUV formats are BT.601 with limited range and need an even width,
+    nv12 and i420 an even height."""
     fx: Positive = 424.0
     """Focal length along x [px] [public colonoscope calibration]."""
     fy: Positive = 454.0

@@ -12,5 +12,4 @@ class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     period: Positive = 0.005
     """Control period [s] [ours; the article states hundreds of Hz]."""
     history: Positive = 2.0
-    """Length of the command history, in which the command at a frame's capture time is found [s];
-    at most 1024 ticks. Older frames are rejected."""
+    """Length of the command history, at most 1024 ticks [s]. Older frames are rejected."""

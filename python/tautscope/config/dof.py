@@ -16,21 +16,21 @@ class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     update_distance: Positive
     """tau: command travel between two estimator updates [m or rad]; about 1 % of the stroke."""
     observable_deviation: Positive
-    """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
-    the DOF counts as observable; beyond it the DOF is held."""
+    """Standard deviation of the state per px of marker noise beyond which the DOF is held [m/px or
+    rad/px]."""
     expected_width: Positive
-    """Width of the slack that is expected [m or rad]; three quarters of it are the unit in which
-    profile ``best`` estimates [ours]."""
+    """Width of the slack that is expected [m or rad]; three quarters are the unit of profile
+    ``best`` [ours]."""
     start_deviation: Positive
     """Standard deviation of the tip about the reference before the first image [m or rad]; about
     half the slack [ours]."""
     free_gain: Gain = 5.0
     """K_b: command over reference while the slack is crossed [paper]."""
     gain_limit: Gain = 5.0
-    """Upper bound of every gain; free_gain may not exceed it [paper]."""
+    """Bound of every gain, free_gain included [paper]."""
     recovery: Annotated[float, Meta(ge=0, lt=1)] = 0.0
-    """Share of the reference's travel by which the command returns to the reference after changed
-    offsets; with 0 it does not return [paper]."""
+    """Share of the reference's travel by which the command returns to it after changed offsets
+    [paper]."""
     contact_tolerance: Fraction = 0.4
     """epsilon: contact tolerance in Eq. (4) [ours]."""
     smoothing_factor: Fraction = 0.25

@@ -46,37 +46,35 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """
 
     node: Annotated[int, Meta(ge=1, le=127)]
-    """CANopen node id; with EtherCAT, the position on the line, counted from 1; id of a servo; axis
-    of a microcontroller, counted from 1."""
+    """CANopen node id or id of a servo; position on the EtherCAT line or axis of a microcontroller,
+    from 1."""
     counts_per_unit: Positive
-    """Encoder counts per m or rad of the instrument's DOF, including gears. A servo has 4096 per
-    turn of its horn; without gears these are 651.9 per rad, the default of servos."""
+    """Encoder counts per m or rad of the DOF, including gears. A servo has 4096 per turn: 651.9 per
+    rad, its default."""
     sign: Literal[-1, 1]
     """1, the default, if the counts increase with the DOF, else -1."""
     travel: tuple[float, float]
-    """Smallest and largest position [m or rad]; set in the drive and checked for every command."""
+    """Smallest and largest position [m or rad]; set in the drive, checked for every command."""
     speed_limit: Positive
-    """Largest speed [m/s or rad/s]; set in the drive and checked for every command."""
+    """Largest speed [m/s or rad/s]; set and checked alike."""
     following_error: Positive
     """Largest distance of the motor from all commands of the last `lag` [m or rad]; by default 1 %
     of the width of `travel`, of a servo 64 counts."""
     following_window: Positive
-    """Largest distance that may last longer than `following_timeout` [m or rad]; at most
-    `following_error`, and by default half of it."""
+    """Largest distance that may last longer than `following_timeout` [m or rad]; by default half of
+    `following_error`."""
     home: float = 0.0
     """Position of the DOF at 0 counts [m or rad]."""
     eds: str | None = None
-    """The drive's EDS file, relative to the TOML file; without it, the default types of CiA 402."""
+    """The drive's EDS file, relative to the TOML file; without it, the types of CiA 402."""
     model: str | None = None
-    """Model of a servo, which must be the connected one; other drives have none."""
+    """Model of a servo, which the connected one must be."""
     homing_offset: Annotated[int, Meta(ge=-2047, le=2047)] = 0
-    """What the servo itself adds to its position, set in the servo [counts]."""
+    """What a servo itself adds to its position, set in it [counts]."""
     stops: tuple[float, float] | None = None
-    """Mechanical stops of a servo [m or rad], found by `tautscope calibrate stops`; `travel` lies
-    between them."""
+    """Mechanical stops of a servo around `travel`, by `tautscope calibrate stops` [m or rad]."""
     torque_limit: Annotated[float, Meta(gt=0, le=1)] = 1.0
-    """Share of its largest motor voltage (Dynamixel, goal PWM) or torque (Feetech) that a servo
-    uses, set in the servo."""
+    """Share of its largest voltage (Dynamixel, goal PWM) or torque (Feetech) that a servo uses."""
 
 
 class MotorConfig(AxisConfig, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -96,65 +94,58 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     rotation: AxisConfig | None = None
     bending: AxisConfig | None = None
     motors: Annotated[dict[str, MotorConfig], Meta(max_length=8)] = field(default_factory=dict)
-    """The motors of a robot with ``[[dof]]``, by its names in their order, or by those of
-    ``[actuators]``, in place of insertion, rotation and bending: the keys of those, and ``unit`` of
-    their values, which is that of the DOF or of ``actuators.units``."""
+    """In place of insertion, rotation and bending, the motors of a robot with ``[[dof]]``, by its
+    names or those of ``[actuators]`` in their order: the keys below, and ``unit`` of the DOF or of
+    ``actuators.units``."""
     protocol: Literal["canopen", "ethercat", "dynamixel", "feetech", "serial"] = "canopen"
-    """Protocol of the bus: CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos (protocol
-    2.0), Feetech STS servos, or motors behind a microcontroller on a serial line."""
+    """CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos, Feetech STS servos, or motors
+    behind a microcontroller on a serial line."""
     interface: str = "socketcan"
-    """Name of a python-can interface that does not receive its own frames."""
+    """A python-can interface that does not receive its own frames."""
     channel: str = "can0"
-    """Channel of the interface; with EtherCAT, the network adapter; else the serial port, by
-    default /dev/ttyUSB0 (Dynamixel) or /dev/ttyACM0 (Feetech, microcontroller)."""
+    """Its channel; network adapter of EtherCAT; else the serial port, by default /dev/ttyUSB0
+    (Dynamixel) or /dev/ttyACM0."""
     bitrate: Annotated[int, Meta(ge=9_600, le=4_000_000)] = 1_000_000
-    """[bit/s]; SocketCAN uses the setting of the operating system. Of a microcontroller, by default
-    250000."""
+    """[bit/s]; by default 250000 of a microcontroller. SocketCAN has that of the operating
+    system."""
     options: dict[str, str | int | float | bool] = field(default_factory=dict)
     """Further options of the interface."""
     cycle: Positive = 0.01
     """Time from one set-point to the next [s], whole milliseconds."""
     reply_timeout: Positive = 0.006
-    """How long a cycle waits for the drives' answers [s]; later ones are counted as late."""
+    """How long a cycle waits for the drives' answers; later ones are counted [s]."""
     lead_points: Annotated[int, Meta(ge=0, le=16)] = 2
-    """Set-points in the drive's input buffer, interpolated position mode only; each adds a delay
-    of one cycle and tolerates jitter of one cycle."""
+    """Set-points in the drive's input buffer in mode 7; each adds a delay of one cycle and
+    tolerates jitter of one."""
     master_node: Annotated[int, Meta(ge=1, le=127)] = 127
     """Node id of the master's heartbeat."""
     heartbeat_period: Positive = 0.02
-    """Period of the heartbeats of master and drives [s], whole milliseconds."""
+    """Period of all heartbeats [s], whole milliseconds."""
     heartbeat_timeout: Positive = 0.08
-    """Time without a heartbeat after which a drive quick-stops, and the master stops all drives
-    [s], whole milliseconds. Of servos, time without an answer or a set-point, and the bus watchdog
-    of Dynamixel, rounded up to 20 ms. Of a microcontroller, its watchdog time."""
+    """Time without a heartbeat after which drives quick-stop [s], whole milliseconds; of servos,
+    without an answer or a set-point; watchdog time of a microcontroller, and of Dynamixel, rounded
+    up to 20 ms."""
     state_timeout: Positive = 1.0
     """Timeout of each state transition [s]."""
     request_timeout: Positive = 0.3
     """Timeout of each SDO response, or answer of a servo to a setting [s]."""
     lag: Positive = 0.02
-    """Largest delay of the motors [s]: filters and servo loops of the drives, late set-points; by
-    default 0.06 of servos and microcontrollers."""
+    """Largest delay of the motors [s]: filters and servo loops, late set-points; by default 0.06 of
+    servos and microcontrollers."""
     following_timeout: Positive = 0.05
     """How long the following error may exceed `following_window` [s], whole milliseconds."""
     command_timeout: Positive = 0.5
-    """Time without a command of the loop after which the motors are quick-stopped [s]; they are
-    held meanwhile."""
+    """Time without a command, in which the motors are held, until their quick stop [s]."""
     start_speed: Fraction = 0.1
     """Fraction of `speed_limit` for the move to the start of a run."""
     after_quick_stop: Literal["hold", "release"] = "hold"
-    """Whether the motor is held or released after a quick stop."""
+    """What happens to the motors after a quick stop."""
     preset: Preset | None = None
-    """Settings of a maker's drives. The keys of this section replace those of the preset, except
-    that waivers add up."""
+    """Settings of a maker's drives, which this section's keys replace; waivers add up."""
     interpolation_time: bool = False
-    """Whether the cycle is set (0x60C2) in mode 8 too, for drives that interpolate by it."""
+    """Whether the cycle is set (0x60C2) in mode 8 too."""
     waive: tuple[Waiver, ...] = ()
-    """What the drives lack and the run does without. Protections: heartbeat of the master (1016),
-    heartbeat of the drive (1017), reaction to a lost connection (6007), quick stop option (605A),
-    position limits (607D); 607F: speed limits (also 6080), which are not set. What is not
-    checked: supported modes (6502: 8, else 7, is tried), mode display until the drive is enabled
-    (6061), interpolation time (60C2), bit 12 (follows set-points) or 13 (following error) of the
-    statusword (6041.12, 6041.13)."""
+    """What the drives lack and the run does without: docs/hardware.md, presets and waivers."""
 
     @property
     def all_motors(self) -> tuple[Motor, ...]:

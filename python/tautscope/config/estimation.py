@@ -16,11 +16,9 @@ class EstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     marker_deviation: Positive = 0.3
     """Standard deviation of a marker without a covariance [px]."""
     shape_deviation: NonNegative = 0.3
-    """Standard deviation of the unevenness of the section's curvature: half of the difference of
-    its ends, over the mean."""
+    """Standard deviation of the unevenness of the section's curvature, docs/notation.md."""
     image_deviation: NonNegative = 6.0
-    """Standard deviation of a shift of the image, by an error of the camera's pose or principal
-    point [px]."""
+    """Standard deviation of a shift of the image by the camera's pose or principal point [px]."""
     misfit_deviation: NonNegative = 2.0
     """Standard deviation of what else the feature model errs [px]."""
     misfit_travel: Positive = 2.0

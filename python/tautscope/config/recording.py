@@ -18,7 +18,7 @@ class RecordingConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
 
     image_format: ImageFormat = "png"
     """``png`` is lossless, so that replays are identical; ``jpeg`` takes a fifth of the space and
-    shifts features by up to 0.3 px, so that replays are not identical (decision 0020)."""
+    shifts features by up to 0.3 px."""
     jpeg_quality: Annotated[int, Meta(ge=1, le=100)] = 95
     """JPEG quality, for ``jpeg``."""
     flush_period: Annotated[float, Meta(gt=0, le=0.2)] = 0.1
@@ -28,6 +28,6 @@ class RecordingConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
     queue_events: Annotated[int, Meta(ge=1)] = 20_000
     """Queue length for ticks and image updates; more are dropped with a warning."""
     queue_images: Annotated[int, Meta(ge=1)] = 50
-    """Queue length for images; more are dropped with a warning."""
+    """The same for images."""
     close_timeout: Positive = 10.0
     """Longest wait for the disk at the end of a run [s]."""

@@ -45,7 +45,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     profile: Profile = "best"
     """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of
-    `LawConfig` and `EstimationConfig`."""
+    docs/best.md."""
     law: LawConfig = field(default_factory=LawConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     insertion: DofConfig = field(

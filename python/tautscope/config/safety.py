@@ -17,94 +17,85 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Supervision of the loop [ours]; docs/safety.md lists the reaction to each flag.
 
     Three values are those of insertion, rotation and bending, in [m, rad, rad] or those per second.
-    The settings change nothing in a run without a fault.
+    "Stops": until the operator re-engages. The settings change nothing in a run without a fault.
     """
 
     off: tuple[str, ...] = ()
-    """Detectors that are switched off, by the names of `tautscope.loop.safety.DETECTORS`; every
-    report names them."""
+    """Detectors that are switched off, as in docs/safety.md; every report names them."""
     unusual: tuple[str, ...] = ()
-    """Keys by dotted path, as "safety.stall", that may be beyond a 30th to 30 times their default;
-    every report names them."""
+    """Keys by dotted path, as "safety.stall", that may have unusual values; every report names
+    them."""
     width_limit: PerDof = (12e-3, 2.6, 1.5)
-    """Largest estimated width of the slack; the article's are 10 mm, 1.8 rad, 1.1 rad. Also the
-    largest difference between command and reference, and the unit of the travels below."""
+    """Largest estimated width of the slack, and difference between command and reference; unit of
+    the travels below."""
     offset_limit: PerDof = (8e-3, 1.6, 0.9)
     """Largest absolute value of an estimated contact offset."""
     reference_speed: PerDof = (0.04, 4.0, 2.0)
-    """Largest speed of the reference over `reference_time`; a faster one is followed at this speed,
-    and what it lags is caught up while the operator moves on. Three times the fastest operator in
-    docs/faults.md."""
+    """Largest speed of the reference over `reference_time`. A faster one is followed at this speed;
+    what it lags is caught up in further motion."""
     reference_time: Positive = 0.04
     """Time over which the speed is averaged: a tremor of 1 mm passes, a jump of 2 mm does not
     [s]."""
     command_speed: PerDof = (0.4, 27.0, 16.0)
-    """Largest speed of the command; the reference is followed at no more than this over
-    `gain_limit`. A faster command does not move, and motion stops until the operator re-engages.
-    Six times the command's speed for a reference of 12.6 mm/s, which crosses the slack K_b times as
-    fast."""
+    """Largest speed of the command: a faster one stops. The reference is followed at no more than
+    this over `gain_limit`."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
     reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)
-    """Resolution of the input device, or its largest step from rest: its value may change by this
-    more than its speed before and `reference_speed` allow [m, rad, rad]; beyond this it has jumped,
-    and motion stops until the operator re-engages."""
+    """Resolution of the input device, or its largest step from rest [m, rad, rad]: motion stops
+    where the reference changes by this more than its speed before and `reference_speed` allow."""
     reference_age: Positive = 0.05
-    """Largest age of a reference, where its time is known; an older one moves nothing [s]. A device
-    that repeats its value bit for bit for longer is at rest or silent: its next change must be one
-    that starts from rest."""
+    """Largest age of a reference, where its time is known; an older one moves nothing [s]. After
+    identical values for longer, the next change must be one that starts from rest."""
     late_tick: Annotated[float, Meta(gt=1)] = 3.0
     """Longest time between two control ticks; motion after a longer one is discarded [control
     periods]."""
     stall: Positive = 0.1
-    """Time between two control ticks above which motion stops until the operator re-engages [s]."""
+    """Time between two control ticks above which motion stops [s]."""
     frame_age: Positive = 0.3
     """Largest age of a frame on arrival; an older one is refused [s]."""
     frame_gap: Positive = 0.18
-    """Longest time without a frame; after it the camera counts as lost [s]."""
+    """Time without a frame after which the camera counts as lost [s]."""
     clock_jump: Positive = 1.0
-    """A frame captured this much earlier than the one before it shows that the camera's clock was
-    set back; less is a frame out of order [s]."""
+    """A frame captured this much before the last one shows that the camera's clock was set back;
+    less, a frame out of order [s]."""
     frozen_travel: Annotated[float, Meta(gt=0, le=1_000_000)] = 0.01
-    """Travel of the command, in either direction, after which an identical image counts as frozen
-    [in update_distance]. Sensor noise makes every image different, also at rest; a source without
-    noise needs more than the slack."""
+    """Travel of the command after which an identical image counts as frozen [in update_distance]. A
+    source without sensor noise needs more than the slack."""
     innovation_limit: Positive = 8.0
-    """Largest innovation; a frame with a larger one is refused [in standard deviations]."""
+    """Largest innovation of a frame that is used [in standard deviations]."""
     state_noise: Vector3 = (0.03e-3, 1.5e-3, 1.5e-3)
-    """Standard deviation of the state estimate in a still scene [m, rad, rad], twin. Three times
-    this must be below contact_tolerance times update_distance, or noise is taken for contact."""
+    """Standard deviation of the state estimate in a still scene [m, rad, rad]. Three times this
+    must be below contact_tolerance times update_distance, or noise is taken for contact."""
     tremor_swing: Positive = 0.5
-    """Least swing of the reference that is a tremor, one way [in update_distance]."""
+    """Least one-way motion of the reference that is a tremor [in update_distance]."""
     tremor_rate: Positive = 4.0
-    """Reversals of the reference, with swings below width_limit, that are a tremor [1/s]."""
+    """Reversals of the reference, within width_limit, that are a tremor [1/s]."""
     ahead_limit: Positive = 0.1
     """How much farther than the reference the tip may move in a stroke; beyond it there is less
     slack than is compensated [in width_limit]."""
     ahead_ratio: Positive = 1.5
-    """Travel of the tip over that of the reference in a stroke, above which `ahead_limit` applies:
-    a tip that crosses slack stays below."""
+    """Travel of the tip over that of the reference in a stroke, above which `ahead_limit`
+    applies."""
     offset_decrease: Positive = 2.0
     """Largest decrease of an estimated contact offset within a stroke; beyond it there was less
     slack than was compensated [in ahead_limit]."""
     cycle_swings: Count = 4
-    """Growing swings in a row, of reference and tip, that are a limit cycle of operator and
-    instrument."""
+    """Growing swings in a row, of reference and tip, that are a limit cycle."""
     cycle_growth: Positive = 1.1
-    """Ratio of a swing to the one before it, from which it grows."""
+    """Ratio of a swing to the last one, from which it grows."""
     cycle_time: Positive = 2.0
     """Longest swing of a limit cycle, one way [s]."""
     hold_time: NonNegative = 4.0
     """Time after which a flag that is still raised goes to its next reaction [s]."""
     hold_travel: NonNegative = 4.0
-    """Travel of the reference, summed over the degrees of freedom, after which it does so as well
-    [in width_limit]."""
-    fade_travel: Positive = 2.0
-    """Travel over which compensation fades to nothing [in width_limit]."""
-    restore_travel: Positive = 2.0
-    """Travel over which compensation returns after the cause of a fade has cleared [in
+    """Travel of the reference, summed over all DOFs, after which it does so too [in
     width_limit]."""
+    fade_travel: Positive = 2.0
+    """Travel over which compensation fades [in width_limit]."""
+    restore_travel: Positive = 2.0
+    """Travel over which compensation returns after a fade [in width_limit]."""
     good_frames: Count = 5
-    """Good frames in a row after which a flag of frames is cleared."""
+    """Good frames in a row that clear a flag of frames."""
     good_ticks: Count = 200
-    """Good control ticks in a row after which a flag of ticks is cleared."""
+    """Good control ticks in a row that clear a flag of ticks."""

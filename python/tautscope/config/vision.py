@@ -88,10 +88,10 @@ class BlurConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Marker detection, Eq. (12) and Fig. 5."""
+    """Marker detection, Eq. (12) and Fig. 5. All [ours]."""
 
     weights: Vector3 = (-0.525, 1.0, -0.648)
-    """Fisher's discriminant: weights of blue, green, red [ours, fitted to labelled pixels]."""
+    """Fisher's discriminant: weights of blue, green, red [fitted to labelled pixels]."""
     threshold: float = 5.0
     """A pixel is marker if its weighted sum exceeds this [grey levels]."""
     alternatives: tuple[tuple[Vector3, float], ...] = (
@@ -99,38 +99,37 @@ class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         ((-0.45, 1.0, -0.55), 8.0),
         ((-0.525, 1.0, -0.648), 40.0),
     )
-    """Weights and threshold that are tried in turn where the first give no clear result: for a
-    white balance in which grey looks green, for over-exposure in which green looks white, and for
-    bands that touch in a blurred image [ours]."""
+    """Weights and threshold that are tried in turn where the first give no clear result: where grey
+    looks green, for over-exposure, and for bands that touch in a blurred image."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
-    """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
+    """Passes of the 3x3 binomial low-pass over the projected channel."""
     minimum_area: Annotated[int, Meta(ge=1)] = 15
     """Smaller regions are dropped [px]."""
     model_deviation: Positive = 2.5
-    """Standard deviation of a band's position predicted by the instrument model [px] [ours]."""
+    """Standard deviation of a predicted position of a band [px]."""
     search_margin: Positive = 12.0
-    """Margin around the predicted outlines that is searched, for motion and blur [px] [ours]."""
+    """Margin around the predicted outlines that is searched [px]."""
     least_inside: Fraction = 0.5
-    """A band is rejected if less of it is inside the image [share of its area] [ours]."""
+    """A band is rejected if less of it is inside the image [share of its area]."""
     least_coverage: Fraction = 0.4
-    """Or if less of it has the markers' colour [share of its area in the image] [ours]."""
+    """Or if less of it has the markers' colour [share of its area in the image]."""
     least_exclusive: Fraction = 0.8
-    """Or if less of that colour is outside the other band's outline [share of it] [ours]."""
+    """Or if less of that colour is outside the other band's outline [share of it]."""
     largest_spill: Fraction = 0.25
     """Or if more of what surrounds it has the markers' colour [share of a ring, relative to the
-    coverage] [ours]."""
+    coverage]."""
     least_edges: Fraction = 0.4
-    """Or if less of its outline is found as edges [share of the outline] [ours]."""
+    """Or if less of its outline is found as edges [share of the outline]."""
     least_rims: Fraction = 0.2
-    """Or if less of its two rims is: its sides alone do not tell the position along them [ours]."""
+    """Or if less of its two rims is: its sides do not tell the position along them."""
     least_edges_on_average: Fraction = 0.6
-    """The weaker band is rejected if the mean edge share of both is below this [ours]."""
+    """The weaker band is rejected if the mean edge share is below this."""
     least_edges_alone: Fraction = 0.85
     """A band found alone is rejected if its edge share is below this, or its coverage below 3/4 of
-    it [ours]."""
+    it."""
     largest_surprise: Positive = 18.5
-    """Largest squared Mahalanobis distance of the bands from their predicted positions; chi-squared
-    with 4 degrees of freedom exceeds it once in a thousand [ours]."""
+    """Largest squared Mahalanobis distance of both bands from the prediction; by chance exceeded
+    once in a thousand."""
     fit: OutlineFitConfig = field(default_factory=OutlineFitConfig)
     clear: ClearConfig = field(default_factory=ClearConfig)
     unlocated: UnlocatedConfig = field(default_factory=UnlocatedConfig)
