@@ -8,7 +8,7 @@ use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use support::loops::{Loop, article, best, model};
 use support::{PERIOD, UNITS};
-use tautscope_core::{Flag, Play, Profile, Reaction};
+use tautscope_core::{Flag, Loop as _, Play, Profile, Reaction};
 
 #[derive(Arbitrary, Debug)]
 enum Action {

@@ -1,14 +1,14 @@
 //! Loops as objects, whose number of DOFs and profile are known at run time.
 
 use crate::article::play::Play;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, require};
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{GeometryEstimate, Report, SlackEstimate};
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::Supervision;
+use crate::supervision::supervisor::Supervision;
 
 /// Most DOFs of a loop.
 pub const DOFS: usize = 8;
@@ -45,19 +45,19 @@ pub trait Loop {
     /// State of the supervision.
     fn supervision(&self) -> Supervision;
 
-    /// As [`HysteresisReduction::set_compensation`].
+    /// Use this share of the compensation: all with 1, none with 0. Bumpless: the command rests while the reference rests.
     ///
     /// # Errors
-    /// The share is not from 0 to 1.
+    /// The share is not from 0 to 1; the loop is unchanged.
     fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError>;
 
-    /// As [`HysteresisReduction::engage`].
+    /// Re-engage the operator input: motion continues from rest, with the next increment of the reference.
     fn engage(&mut self);
 
-    /// As [`HysteresisReduction::acknowledge`].
+    /// Acknowledge the warnings.
     fn acknowledge(&mut self);
 
-    /// As [`HysteresisReduction::raise`].
+    /// Raise a flag that only the rig can detect.
     fn raise(&mut self, flag: Flag);
 }
 
@@ -127,23 +127,26 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 
     fn supervision(&self) -> Supervision {
-        Self::supervision(self)
+        self.monitors.supervision()
     }
 
     fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
-        Self::set_compensation(self, share)
+        let is_share = (0.0..=1.0).contains(&share);
+        require(is_share, "compensation", share, "a share from 0 to 1")?;
+        self.monitors.choose_share(&mut self.profile, share);
+        Ok(())
     }
 
     fn engage(&mut self) {
-        Self::engage(self);
+        self.monitors.engage();
     }
 
     fn acknowledge(&mut self) {
-        Self::acknowledge(self);
+        self.monitors.acknowledge();
     }
 
     fn raise(&mut self, flag: Flag) {
-        Self::raise(self, flag);
+        self.monitors.raise(flag);
     }
 }
 

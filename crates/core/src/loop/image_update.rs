@@ -4,7 +4,7 @@ use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
 use crate::estimation::history::Entry;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
-use crate::r#loop::profile::{BandBlocks, BandProfile, BandsView, Image, Profile, Seen, Updated};
+use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen, Updated};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
 use crate::r#loop::sight::Sight;
@@ -270,7 +270,7 @@ struct Bands<'a> {
     image: Option<Image<'a>>,
 }
 
-impl<P: BandBlocks> Sight<P, 3> for Bands<'_> {
+impl<P: BandProfile> Sight<P, 3> for Bands<'_> {
     type View = BandsView;
 
     fn is_usable(&self) -> bool {
