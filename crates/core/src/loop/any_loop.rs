@@ -4,7 +4,7 @@ use crate::article::play::Play;
 use crate::error::{ConfigError, require};
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
-use crate::r#loop::profile::{BandProfile, Profile};
+use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{GeometryEstimate, Report, SlackEstimate};
 use crate::supervision::flags::Flag;
@@ -61,9 +61,13 @@ pub trait Loop {
     fn raise(&mut self, flag: Flag);
 }
 
-/// A loop of the article's instrument, with the functions of [`HysteresisReduction`] for its bands.
-#[expect(missing_docs, reason = "at the functions of the loop")]
+/// A loop of the article's instrument.
 pub trait BandLoop: Loop {
+    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
+    ///
+    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
+    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
     fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -72,8 +76,15 @@ pub trait BandLoop: Loop {
         checksum: Option<u64>,
     ) -> Report;
 
+    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
+    /// detection, corrected by the last images.
+    ///
+    /// None beyond the history.
     fn predict_state(&self, captured_at: f64) -> Option<Belief>;
 
+    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
+    ///
+    /// None beyond the history and where a band is not visible.
     fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]>;
 
     /// What images say of the geometry; None in profile `paper`.
@@ -147,30 +158,6 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
 
     fn raise(&mut self, flag: Flag) {
         self.monitors.raise(flag);
-    }
-}
-
-impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for HysteresisReduction<P, S> {
-    fn on_features(
-        &mut self,
-        measured: Option<[f64; 4]>,
-        covariance: Option<&[[f64; 4]; 4]>,
-        captured_at: f64,
-        checksum: Option<u64>,
-    ) -> Report {
-        Self::on_features(self, measured, covariance, captured_at, checksum)
-    }
-
-    fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        Self::predict_state(self, captured_at)
-    }
-
-    fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
-        Self::predicted_features(self, captured_at)
-    }
-
-    fn geometry(&self) -> Option<GeometryEstimate> {
-        self.profile.geometry()
     }
 }
 

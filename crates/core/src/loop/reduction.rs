@@ -4,7 +4,6 @@ use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, zip_with};
 use crate::error::ConfigError;
-use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
@@ -37,25 +36,6 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
         let of_loop = settings.of_loop()?;
         let make = |limits| P::new(settings, limits);
         Self::with_profile(&of_loop, make, settings.feature_model()?, storage)
-    }
-
-    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
-    /// detection, corrected by the last images.
-    ///
-    /// None beyond the history.
-    pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        let past = self.history.at(captured_at)?;
-        Some(self.profile.predict(&self.history, &past))
-    }
-
-    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
-    ///
-    /// None beyond the history and where a band is not visible.
-    pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
-        let past = self.history.at(captured_at)?;
-        let model = self.profile.feature_model(&self.view);
-        let prediction = model.predict(past.predicted_state)?;
-        Some(prediction.features)
     }
 }
 
