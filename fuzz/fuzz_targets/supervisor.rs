@@ -8,7 +8,7 @@ use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use support::loops::{Loop, article, best, model};
 use support::{PERIOD, UNITS};
-use tautscope_core::{Flag, Play, Profile, Reaction};
+use tautscope_core::{BandLoop as _, BandProfile, Flag, Loop as _, Play, Reaction};
 
 #[derive(Arbitrary, Debug)]
 enum Action {
@@ -43,7 +43,7 @@ fuzz_target!(|input: (bool, Vec<Action>)| {
     }
 });
 
-fn run<P: Profile>(mut reduction: Loop<P>, actions: Vec<Action>) {
+fn run<P: BandProfile>(mut reduction: Loop<P>, actions: Vec<Action>) {
     let (mut now, mut reference) = (0.0, [0.025, 0.0, 0.9]);
     let mut last = reduction.step(reference, None, now);
     for action in actions {

@@ -65,7 +65,7 @@ impl FeatureModel {
         let mut features = Vec::with_capacity(states.len());
         let mut matrices = Vec::with_capacity(4 * states.len());
         for (state, unevenness) in states.into_iter().zip(unevenness) {
-            let found = self.0.with_unevenness(*unevenness).predict(state);
+            let found = self.0.with_geometry([*unevenness, 0.0, 0.0]).predict(state);
             features.push(found.map_or([f64::NAN; 4], |found| found.features));
             let columns = found.map_or([[f64::NAN; 4]; 3], |found| found.columns);
             matrices.extend((0..4).map(|row| columns.map(|column| column[row])));

@@ -10,7 +10,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use tautscope_config::Configuration;
-use tautscope_core::{Entry, HysteresisReduction, Paper, Play, PlayState, Settings};
+use tautscope_core::{BandLoop, Entry, HysteresisReduction, Paper, Play, PlayState, Settings};
 
 /// Widths of the plays: Table 1 of the article [m, rad, rad].
 const WIDTHS: [f64; 3] = [10e-3, 1.8, 1.1];

@@ -52,6 +52,16 @@ pub(crate) fn require_positive(field: &'static str, value: f64) -> Result<(), Co
     require(holds, field, value, "a finite number above 0")
 }
 
+/// [`require_positive`] of every value of some fields.
+pub(crate) fn require_all_positive(fields: &[(&'static str, &[f64])]) -> Result<(), ConfigError> {
+    let values = fields
+        .iter()
+        .flat_map(|(field, values)| values.iter().map(move |value| (field, value)));
+    values
+        .into_iter()
+        .try_for_each(|(field, value)| require_positive(field, *value))
+}
+
 pub(crate) fn require_non_negative(field: &'static str, value: f64) -> Result<(), ConfigError> {
     let holds = value.is_finite() && value >= 0.0;
     require(holds, field, value, "a finite number, 0 or above")

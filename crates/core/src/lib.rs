@@ -94,6 +94,7 @@ pub use model::section::{SECTION_DISCS, SectionDisc};
 pub use model::settings::{CameraSettings, InstrumentSettings, PoseSettings};
 pub use settings::{ControlSettings, DofSettings};
 pub use supervision::flags::{Flag, Flags};
-pub use supervision::monitors::{SENSORS, Supervision};
+pub use supervision::monitors::SENSORS;
 pub use supervision::reactions::Reaction;
 pub use supervision::settings::SafetySettings;
+pub use supervision::supervisor::Supervision;

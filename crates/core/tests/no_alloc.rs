@@ -7,7 +7,9 @@ mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use support::loops::{Loop, article_with, best_with, model};
-use tautscope_core::{BandProfile, Flag, Play, Reaction, Status, Triggers};
+use tautscope_core::{
+    BandLoop as _, BandProfile, Flag, Loop as _, Play, Reaction, Status, Triggers,
+};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;

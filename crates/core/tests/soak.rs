@@ -11,7 +11,7 @@ mod support;
 use support::PERIOD;
 use support::loops::{Loop, article, article_with, best};
 use support::plays::{ThreePlays, real, reference};
-use tautscope_core::{BandProfile, Play, Reaction};
+use tautscope_core::{BandLoop as _, BandProfile, Loop as _, Play, Reaction};
 
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;

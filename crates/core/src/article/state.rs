@@ -1,6 +1,6 @@
 //! The state estimate from one image, Eqs. (13)-(16), and which DOFs the image does not determine.
 
-use crate::dof::{PerDof, all_finite};
+use crate::dof::{PerDof, all_finite, zip_with};
 use crate::error::{ConfigError, require_positive};
 use crate::model::features::FeaturePrediction;
 
@@ -108,22 +108,12 @@ impl StateEstimator {
         ];
         while finite && solve_and_hold_one(&mut axes, step) {}
 
-        let [insertion, rotation, bending] = axes;
-        let [q1, q2, q3] = predicted_state;
         StateEstimate {
-            state: [
-                q1 + insertion.correction(),
-                q2 + rotation.correction(),
-                q3 + bending.correction(),
-            ],
-            observable: [insertion.active, rotation.active, bending.active],
-            deviation: [
-                insertion.ratio * insertion_unit,
-                rotation.ratio * rotation_unit,
-                bending.ratio * bending_unit,
-            ],
+            state: zip_with(predicted_state, axes, |q, axis| q + axis.correction()),
+            observable: axes.map(|axis| axis.active),
+            deviation: axes.map(|axis| axis.ratio * axis.unit),
             innovation,
-            inverse: [insertion.row(), rotation.row(), bending.row()],
+            inverse: axes.map(|axis| axis.row()),
         }
     }
 }

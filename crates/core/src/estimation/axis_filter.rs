@@ -43,22 +43,20 @@ impl AxisFilter {
 
     /// The predicted tip for the next command.
     pub fn step(&mut self, command: f64) -> f64 {
-        if self.estimate.origin()[0].is_nan() {
-            self.estimate.start([command]);
+        if self.estimate.origin[0].is_nan() {
+            self.estimate.origin = [command];
         }
-        let [origin] = self.estimate.origin();
-        let [unit] = self.estimate.transmission().unit();
-        self.plays = self
-            .estimate
-            .transmission()
-            .advance(&self.plays, &[(command - origin) / unit]);
+        let [origin] = self.estimate.origin;
+        let transmission = &self.estimate.transmission;
+        let [unit] = transmission.unit();
+        self.plays = transmission.advance(&self.plays, &[(command - origin) / unit]);
         let [tip] = self.estimate.tip(&self.plays);
         tip
     }
 
     /// Updates the estimate with the tip measured at the last command; one that is not finite updates nothing.
     pub fn update(&mut self, tip: f64) {
-        if !tip.is_finite() || self.estimate.origin()[0].is_nan() {
+        if !tip.is_finite() || self.estimate.origin[0].is_nan() {
             return;
         }
         self.estimate.advance(self.plays.travel);
@@ -75,10 +73,8 @@ impl AxisFilter {
     /// The estimated play.
     pub fn play(&self) -> Play {
         let [slack] = self.estimate.slack();
-        Play::from_ordered(
-            slack.centre - slack.half_width,
-            slack.centre + slack.half_width,
-        )
+        let [minus, plus] = slack.offsets();
+        Play::from_ordered(minus, plus)
     }
 
     /// Travel of the tip over that of the command in contact.

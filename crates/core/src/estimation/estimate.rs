@@ -2,14 +2,15 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::dof::zip_with;
 use crate::error::{ConfigError, require_positive};
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, product,
+    COEFFICIENTS, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission, gain_row,
 };
-use crate::model::slack::{GAINS, Slack, width_row};
+use crate::model::slack::{GAINS, Slack};
 
 /// Expected half width, and its spread, in units: of the Gaussian weights of the plays over their radii.
 const EXPECTED: f64 = 2.0 / 3.0;
@@ -35,16 +36,18 @@ const RECENT: f64 = 8.0;
 /// Wrong for a tip that is no sum of plays: by what it deviates from one beyond `tip_deviation`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate<const N: usize, const G: usize, const D: usize> {
-    transmission: Transmission<N>,
+    /// The plays.
+    pub transmission: Transmission<N>,
     settings: EstimateSettings,
     kalman: Kalman<D>,
-    origin: [f64; N],
+    /// First reference (N,) [m or rad]; NaN before it.
+    pub origin: [f64; N],
     /// Travel over which each error of the geometry returns to 0.
     memory: [f64; G],
     /// Travel of the command at the last image.
     travel: f64,
-    /// Mean Birge's ratio of the last images.
-    ratio: f64,
+    /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
+    pub ratio: f64,
 }
 
 /// An error of the geometry before the first image: its standard deviation, and the travel over which it returns to 0.
@@ -80,16 +83,11 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         const { assert!(D == N * COEFFICIENTS + G) };
         settings.check()?;
         let (mut mean, mut variance) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
-        let radii = transmission.radii();
         let own = mean.as_mut_slice().chunks_exact_mut(COEFFICIENTS);
         let spread = variance.as_mut_slice().chunks_exact_mut(COEFFICIENTS);
-        let dofs = radii
-            .into_iter()
-            .zip(transmission.is_alone())
-            .zip(start)
-            .zip(transmission.unit());
-        for ((mean, variance), (((radii, is_alone), start), unit)) in own.zip(spread).zip(dofs) {
-            let (row, spread) = prior(&settings, &radii, is_alone, start, unit);
+        let dofs = transmission.dofs().iter().zip(start);
+        for ((mean, variance), (dof, start)) in own.zip(spread).zip(dofs) {
+            let (row, spread) = prior(&settings, dof, start);
             mean.copy_from_slice(&row);
             variance.copy_from_slice(&spread);
         }
@@ -116,30 +114,10 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         })
     }
 
-    /// Begins at the first reference (N,) [m or rad].
-    pub const fn start(&mut self, origin: [f64; N]) {
-        self.origin = origin;
-    }
-
-    /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
-    pub const fn ratio(&self) -> f64 {
-        self.ratio
-    }
-
-    /// The plays.
-    pub const fn transmission(&self) -> &Transmission<N> {
-        &self.transmission
-    }
-
-    /// First reference (N,) [m or rad]; NaN before it.
-    pub const fn origin(&self) -> [f64; N] {
-        self.origin
-    }
-
     /// Means of the coefficients of each DOF.
     pub fn coefficients(&self) -> [Row; N] {
         let mut rows = [[0.0; COEFFICIENTS]; N];
-        let all = self.kalman.mean().as_slice().chunks_exact(COEFFICIENTS);
+        let all = self.kalman.mean.as_slice().chunks_exact(COEFFICIENTS);
         rows.iter_mut()
             .zip(all)
             .for_each(|(row, own)| row.copy_from_slice(own));
@@ -148,16 +126,9 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
 
     /// Tip (N,) [m or rad] that the plays give.
     pub fn tip(&self, plays: &Plays<N>) -> [f64; N] {
-        let mut tip = self.origin;
-        let parts = plays
-            .regressors()
-            .into_iter()
-            .zip(self.coefficients())
-            .zip(self.transmission.unit());
-        for (tip, ((phi, row), unit)) in tip.iter_mut().zip(parts) {
-            *tip += unit * product(&phi, &row);
-        }
-        tip
+        let apart = plays.tip(&self.coefficients(), [true; N]);
+        let moved = zip_with(apart, self.transmission.unit(), |tip, unit| unit * tip);
+        zip_with(self.origin, moved, |origin, tip| origin + tip)
     }
 
     /// Errors of the geometry (G,) and their standard deviations.
@@ -165,8 +136,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         let (mut mean, mut std) = ([0.0; G], [0.0; G]);
         for (index, (mean, std)) in mean.iter_mut().zip(&mut std).enumerate() {
             let index = N * COEFFICIENTS + index;
-            *mean = self.kalman.mean().get(index).copied().unwrap_or(0.0);
-            *std = libm::sqrt(self.kalman.variance(index));
+            *mean = self.kalman.mean.get(index).copied().unwrap_or(0.0);
+            *std = libm::sqrt(self.kalman.covariance(index, index));
         }
         (mean, std)
     }
@@ -195,31 +166,22 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     pub fn prior(&self, plays: &Plays<N>) -> Prior<N, G> {
         let rows = self.rows(plays);
         let with = self.crosses(&rows);
-        let (mut covariance, mut cross) =
-            (SMatrix::<f64, N, N>::zeros(), SMatrix::<f64, G, N>::zeros());
-        for (column, with) in with.column_iter().enumerate() {
-            let with = with.as_slice();
-            for (line, row) in rows.iter().enumerate() {
-                let value = product_at(line * COEFFICIENTS, row, with);
-                set(&mut covariance, line, column, value);
-            }
-            for (line, value) in with.iter().skip(N * COEFFICIENTS).enumerate() {
-                set(&mut cross, line, column, *value);
+        let mut covariance = SMatrix::<f64, N, N>::zeros();
+        for (mut column, with) in covariance.column_iter_mut().zip(with.column_iter()) {
+            for (line, (entry, row)) in column.iter_mut().zip(&rows).enumerate() {
+                *entry = product_at(line * COEFFICIENTS, row, with.as_slice());
             }
         }
         for (index, std) in self.noise().into_iter().enumerate() {
-            let value = covariance.get((index, index)).copied().unwrap_or(0.0);
-            set(&mut covariance, index, index, value + std * std);
-        }
-        let mut geometry = SMatrix::<f64, G, G>::zeros();
-        for line in 0..G {
-            for column in 0..G {
-                let value = self
-                    .kalman
-                    .covariance(N * COEFFICIENTS + line, N * COEFFICIENTS + column);
-                set(&mut geometry, line, column, value);
+            if let Some(entry) = covariance.get_mut((index, index)) {
+                *entry += std * std;
             }
         }
+        let first = N * COEFFICIENTS;
+        let cross: SMatrix<f64, G, N> = with.fixed_rows::<G>(first).into_owned();
+        let geometry = SMatrix::<f64, G, G>::from_fn(|line, column| {
+            self.kalman.covariance(first + line, first + column)
+        });
         let slope = covariance.cholesky().map_or_else(SMatrix::zeros, |factor| {
             factor.solve(&cross.transpose()).transpose()
         });
@@ -297,22 +259,20 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Standard deviations of the slack of each DOF.
     pub fn slack_deviation(&self) -> [SlackDeviation; N] {
         let mut found = [SlackDeviation::default(); N];
-        let dofs = self.transmission.radii().into_iter().zip(self.slack());
-        for (index, (found, (radii, slack))) in found.iter_mut().zip(dofs).enumerate() {
+        let dofs = self.transmission.dofs().iter().zip(self.slack());
+        for (index, (found, (dof, slack))) in found.iter_mut().zip(dofs).enumerate() {
             let first = index * COEFFICIENTS;
             let deviation = |row: &Row| {
                 let cross = self.kalman.covariance_with(first, row);
                 libm::sqrt(product_at(first, row, cross.as_slice()).max(0.0))
             };
-            let unit = self.transmission.unit().get(index).copied();
-            let unit = unit.unwrap_or(f64::NAN);
-            let half = slack.half_width / unit;
-            let mut by_half = width_row(&radii);
+            let half = slack.half_width / dof.unit;
+            let mut by_half = dof.width_row();
             for (entry, gain) in by_half.iter_mut().zip(gain_row()) {
                 *entry = (*entry - half * gain) / slack.gain;
             }
             *found = SlackDeviation {
-                half_width: unit * deviation(&by_half),
+                half_width: dof.unit * deviation(&by_half),
                 gain: deviation(&gain_row()),
             };
         }
@@ -322,20 +282,11 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Share of the deflection that vector plays make, of all DOFs that share a friction; 0 without such.
     pub fn shared(&self) -> f64 {
         let (mut shared, mut all) = (0.0, 0.0);
-        let dofs = self
-            .transmission
-            .radii()
-            .into_iter()
-            .zip(self.coefficients());
-        for ((radii, row), is_alone) in dofs.zip(self.transmission.is_alone()) {
-            if !is_alone {
-                let parts = radii
-                    .into_iter()
-                    .zip(row)
-                    .map(|(radius, weight)| radius * weight);
-                shared += parts.clone().take(SHARED).sum::<f64>();
-                all += parts.sum::<f64>();
-            }
+        let dofs = self.transmission.dofs().iter().zip(self.coefficients());
+        for (dof, row) in dofs.filter(|(dof, _)| !dof.is_alone) {
+            let parts = dof.all().zip(row).map(|(radius, weight)| radius * weight);
+            shared += parts.clone().take(SHARED).sum::<f64>();
+            all += parts.sum::<f64>();
         }
         (shared / all).clamp(0.0, 1.0)
     }
@@ -365,12 +316,12 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     fn bound_gains(&mut self) {
         for index in 0..N {
             let (first, row) = (index * COEFFICIENTS, gain_row());
-            let gain = product_at(first, &row, self.kalman.mean().as_slice());
+            let gain = product_at(first, &row, self.kalman.mean.as_slice());
             let excess = gain - gain.clamp(GAINS.0, GAINS.1);
             if excess != 0.0 {
                 let with = self.kalman.covariance_with(first, &row);
                 let step = -excess / product_at(first, &row, with.as_slice());
-                self.kalman.mean_mut().axpy(step, &with, 1.0);
+                self.kalman.mean.axpy(step, &with, 1.0);
             }
         }
     }
@@ -399,26 +350,19 @@ fn of_dof<const D: usize>(index: usize, row: &Row) -> SVector<f64, D> {
 }
 
 /// Mean and variance of the coefficients of a DOF before the first image.
-fn prior(
-    settings: &EstimateSettings,
-    radii: &[f64; SHARED + OWN],
-    is_alone: bool,
-    start: &Slack,
-    unit: f64,
-) -> (Row, Row) {
+fn prior(settings: &EstimateSettings, dof: &Radii, start: &Slack) -> (Row, Row) {
     let (mut mean, mut variance) = ([0.0; COEFFICIENTS], [0.0; COEFFICIENTS]);
     let expected = if start.half_width > 0.0 {
-        start.half_width / unit
+        start.half_width / dof.unit
     } else {
         EXPECTED
     };
     let own = settings.weight_deviation * settings.weight_deviation;
     let mut sum = 0.0;
-    for (index, ((mean, variance), radius)) in
-        mean.iter_mut().zip(&mut variance).zip(radii).enumerate()
-    {
+    let plays = mean.iter_mut().zip(&mut variance).zip(dof.all());
+    for (index, ((mean, variance), radius)) in plays.enumerate() {
         let off = (radius - expected) / SPREAD;
-        let share = if is_alone || index < SHARED {
+        let share = if dof.is_alone || index < SHARED {
             1.0
         } else {
             OWN_SHARE
@@ -434,19 +378,8 @@ fn prior(
         *variance = BENT_SHARE * BENT_SHARE * own;
     }
     let [.., centre] = &mut mean;
-    *centre = -start.centre / unit;
+    *centre = -start.centre / dof.unit;
     let [.., offset] = &mut variance;
     *offset = settings.offset_deviation * settings.offset_deviation;
     (mean, variance)
-}
-
-fn set<const R: usize, const C: usize>(
-    matrix: &mut SMatrix<f64, R, C>,
-    row: usize,
-    column: usize,
-    value: f64,
-) {
-    if let Some(entry) = matrix.get_mut((row, column)) {
-        *entry = value;
-    }
 }

@@ -1,6 +1,6 @@
 //! Settings of the estimate of profile `best`.
 
-use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::error::{ConfigError, require, require_all_positive, require_non_negative};
 
 /// The estimate of profile `best`. Names and units are those of the TOML keys; lengths and travels are in units of the DOF:
 /// three quarters of its `expected_width`.
@@ -37,16 +37,14 @@ impl EstimateSettings {
     /// # Errors
     /// One is out of range.
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        for (field, value) in [
-            ("marker_deviation", self.marker_deviation),
-            ("weight_deviation", self.weight_deviation),
-            ("tip_deviation", self.tip_deviation),
-            ("weight_travel", self.weight_travel),
-            ("offset_travel", self.offset_travel),
-            ("misfit_travel", self.misfit_travel),
-        ] {
-            require_positive(field, value)?;
-        }
+        require_all_positive(&[
+            ("marker_deviation", &[self.marker_deviation]),
+            ("weight_deviation", &[self.weight_deviation]),
+            ("tip_deviation", &[self.tip_deviation]),
+            ("weight_travel", &[self.weight_travel]),
+            ("offset_travel", &[self.offset_travel]),
+            ("misfit_travel", &[self.misfit_travel]),
+        ])?;
         for (field, value) in [
             ("shape_deviation", self.shape_deviation),
             ("image_deviation", self.image_deviation),

@@ -11,7 +11,8 @@ use nalgebra::{DVectorView, SMatrix, SVector};
 pub struct Kalman<const D: usize> {
     prior_mean: SVector<f64, D>,
     prior: PriorCovariance<D>,
-    mean: SVector<f64, D>,
+    /// Means (D,).
+    pub mean: SVector<f64, D>,
     covariance: SMatrix<f64, D, D>,
 }
 
@@ -49,27 +50,12 @@ impl<const D: usize> Kalman<D> {
         self.covariance.syger(-1.0, &tie, &tie, 1.0);
     }
 
-    /// Means (D,).
-    pub const fn mean(&self) -> &SVector<f64, D> {
-        &self.mean
-    }
-
     /// Covariance of two coefficients.
     pub fn covariance(&self, a: usize, b: usize) -> f64 {
         self.covariance
             .get((a.max(b), a.min(b)))
             .copied()
             .unwrap_or(f64::NAN)
-    }
-
-    /// Variance of a coefficient.
-    pub fn variance(&self, index: usize) -> f64 {
-        self.covariance(index, index)
-    }
-
-    /// Means (D,).
-    pub const fn mean_mut(&mut self) -> &mut SVector<f64, D> {
-        &mut self.mean
     }
 
     /// Covariance of all coefficients with row . x, for a row of the coefficients from `first` on.

@@ -44,12 +44,10 @@ pub fn step_deviation<const N: usize>(
     state: [f64; N],
     deviation: [f64; N],
 ) -> [f64; N] {
-    let mut own = deviation;
-    let seen = state.into_iter().zip(past.predicted_state);
-    for (own, (state, predicted)) in own.iter_mut().zip(seen) {
-        *own = libm::sqrt(square(*own) + square(STEP_ERROR * (state - predicted)));
-    }
-    own
+    let step = zip_with(state, past.predicted_state, |state, q| state - q);
+    zip_with(deviation, step, |own, step| {
+        libm::sqrt(square(own) + square(STEP_ERROR * step))
+    })
 }
 
 impl<const N: usize> StatePrediction<N> {
@@ -90,10 +88,9 @@ impl<const N: usize> StatePrediction<N> {
 
     /// Makes the prediction `prior` less certain after an image without markers.
     pub(crate) fn miss(&mut self, past: &Entry<N>, prior: &Belief<N>) {
-        let mut wider = prior.deviation;
-        for (deviation, start) in wider.iter_mut().zip(self.start_deviation) {
-            *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
-        }
+        let wider = zip_with(prior.deviation, self.start_deviation, |own, start| {
+            own.max((MISS * own).min(MISSED * start))
+        });
         self.set(past, prior.state, wider, [true; N]);
     }
 

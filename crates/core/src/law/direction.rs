@@ -1,6 +1,6 @@
 //! Direction in which the operator moves the tip.
 
-use crate::dof::Friction;
+use crate::dof::{Friction, zip_with};
 
 /// Direction of the intended motion: of each friction group a string that the motion of its surface pulls.
 ///
@@ -9,60 +9,50 @@ use crate::dof::Friction;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction<const N: usize> {
     friction: Friction<N>,
-    /// Length of the string of each group, in the motion of its surface.
-    length: [f64; N],
+    /// Largest length of the string of each DOF's group, in the motion of its surface.
+    most: [f64; N],
     string: [f64; N],
 }
 
 impl<const N: usize> Direction<N> {
     /// At rest, for strings of `travel` in units (N,) of the first DOF of each group.
     pub fn new(friction: Friction<N>, unit: [f64; N], travel: f64) -> Self {
-        let mut length = [0.0; N];
-        for (group, length) in length.iter_mut().enumerate() {
-            let dofs = friction
-                .members(group)
-                .into_iter()
-                .zip(friction.lever())
-                .zip(unit);
-            let first = dofs.into_iter().find(|((own, _), _)| *own);
-            *length = first.map_or(0.0, |((_, lever), unit)| travel * lever * unit);
-        }
+        let surface = zip_with(friction.lever(), unit, |lever, unit| travel * lever * unit);
+        let most = friction.group().map(|group| {
+            let own = surface.iter().zip(friction.members(group));
+            let mut own = own.filter_map(|(surface, own)| own.then_some(*surface));
+            own.next().unwrap_or(0.0)
+        });
         Self {
             friction,
-            length,
+            most,
             string: [0.0; N],
         }
     }
 
     /// Follows a motion of the reference (N,) [m or rad].
     pub fn step(&mut self, motion: [f64; N]) {
-        let moved = motion.into_iter().zip(self.friction.lever());
-        for (string, (motion, lever)) in self.string.iter_mut().zip(moved) {
-            *string += lever * motion;
-        }
-        for (group, most) in self.length.into_iter().enumerate() {
-            let members = self.friction.members(group);
-            let length = norm(&self.string, members);
-            if length > most {
-                let own = self.string.iter_mut().zip(members).filter(|(_, own)| *own);
-                own.for_each(|(string, _)| *string *= most / length);
-            }
-        }
+        let moved = zip_with(self.friction.lever(), motion, |lever, motion| {
+            lever * motion
+        });
+        self.string = zip_with(self.string, moved, |string, moved| string + moved);
+        let over = zip_with(self.lengths(), self.most, |length, most| {
+            if length > most { most / length } else { 1.0 }
+        });
+        self.string = zip_with(self.string, over, |string, over| string * over);
     }
 
     /// The direction (N,): of each group the string over its length, 1 at most.
     pub fn value(&self) -> [f64; N] {
-        let mut value = self.string;
-        for (group, length) in self.length.into_iter().enumerate() {
-            let members = self.friction.members(group);
-            let own = value.iter_mut().zip(members).filter(|(_, own)| *own);
-            own.for_each(|(value, _)| *value /= length);
-        }
-        value
+        zip_with(self.string, self.most, |string, most| string / most)
     }
-}
 
-fn norm<const N: usize>(vector: &[f64; N], members: [bool; N]) -> f64 {
-    let own = vector.iter().zip(members).filter(|(_, own)| *own);
-    libm::sqrt(own.map(|(value, _)| value * value).sum())
+    /// Length of the string of each DOF's group.
+    fn lengths(&self) -> [f64; N] {
+        self.friction.group().map(|group| {
+            let own = self.string.iter().zip(self.friction.members(group));
+            let own = own.filter(|(_, own)| *own);
+            libm::sqrt(own.map(|(string, _)| string * string).sum())
+        })
+    }
 }

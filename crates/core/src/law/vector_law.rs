@@ -1,7 +1,7 @@
 //! Compensation law of profile `best`: the limited gain of Eq. (2) for DOFs that share a friction together.
 
 use crate::article::play_limit::PlayLimit;
-use crate::dof::all_finite;
+use crate::dof::{all_finite, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 use crate::law::direction::Direction;
 use crate::law::settings::LawSettings;
@@ -73,17 +73,22 @@ pub struct VectorLaw<const N: usize> {
     reference: Option<[f64; N]>,
     /// Reference less command.
     lead: [f64; N],
-    command: [f64; N],
-    plays: Plays<N>,
-    origin: [f64; N],
+    /// The command c (N,) [m or rad]; NaN before the first reference.
+    pub command: [f64; N],
+    /// The plays that follow the command.
+    pub plays: Plays<N>,
+    /// First reference (N,) [m or rad]; NaN before it.
+    pub origin: [f64; N],
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
     /// Travel of the reference, in units.
     travel: [f64; N],
     /// Coefficients in use.
     rows: [Row; N],
-    share: f64,
-    is_limited: bool,
+    /// Share of the compensation in use: all with 1, none with 0. A change is bumpless.
+    pub share: f64,
+    /// Whether the limits of the contact offsets keep the tip from the reference by more than a tenth of a unit.
+    pub is_limited: bool,
 }
 
 /// Bounds of the law for N DOFs.
@@ -151,30 +156,10 @@ impl<const N: usize> VectorLaw<N> {
         })
     }
 
-    /// The command c (N,) [m or rad]; NaN before the first reference.
-    pub const fn command(&self) -> [f64; N] {
-        self.command
-    }
-
-    /// The plays that follow the command.
-    pub const fn plays(&self) -> &Plays<N> {
-        &self.plays
-    }
-
     /// The plays after a motion to a command (N,) [m or rad].
     pub fn follow(&self, plays: &Plays<N>, command: [f64; N]) -> Plays<N> {
         let to = over(subtract(command, self.origin), self.transmission.unit());
         self.transmission.advance(plays, &to)
-    }
-
-    /// Whether the limits of the contact offsets keep the tip from the reference by more than a tenth of a unit.
-    pub const fn is_limited(&self) -> bool {
-        self.is_limited
-    }
-
-    /// First reference (N,) [m or rad]; NaN before it.
-    pub const fn origin(&self) -> [f64; N] {
-        self.origin
     }
 
     /// The command for the next reference (N,) [m or rad], for the estimated coefficients and Birge's ratio of the last images.
@@ -266,22 +251,15 @@ impl<const N: usize> VectorLaw<N> {
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
-        self.travel
-            .iter_mut()
-            .zip(moved)
-            .for_each(|(sum, own)| *sum += own);
+        self.travel = zip_with(self.travel, moved, |sum, own| sum + own);
         let by_gain = gain_row();
-        let ahead = [1.0; N];
-        let now = self.transmission.deflection(&self.rows, &ahead);
-        let new = self.transmission.deflection(rows, &ahead);
-        let tip = self.plays.tip(rows, [true; N]);
-        let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
-        let changes = now.into_iter().zip(new).zip(off).zip(self.travel);
-        for ((used, estimated), (((now, new), off), own)) in
-            self.rows.iter_mut().zip(rows).zip(changes)
-        {
+        let dofs = self.transmission.dofs().iter();
+        let dofs = dofs.zip(self.plays.regressors()).zip(self.travel);
+        for ((used, estimated), ((dof, phi), own)) in self.rows.iter_mut().zip(rows).zip(dofs) {
+            let deflection = dof.deflection(estimated, 1.0) - dof.deflection(used, 1.0);
+            let tip = product(&phi, estimated) - product(&phi, used);
             let steeper = product(&by_gain, estimated) - product(&by_gain, used);
-            let change = (new - now).abs().max(off.abs()).max(FAR * steeper.abs());
+            let change = (deflection.abs().max(tip.abs())).max(FAR * steeper.abs());
             let known = START / own;
             let rate = self.settings.change_rate * (1.0 + known * known);
             // Without a change this is infinite or NaN, of which `min` makes 1.
@@ -295,11 +273,12 @@ impl<const N: usize> VectorLaw<N> {
     /// The target for a reference (N,) in units.
     fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
         let direction = self.direction.value();
-        let deflection = self.transmission.deflection(&self.rows, &direction);
         let mut steady = self.target;
-        let dofs = steady.iter_mut().zip(&self.rows).zip(slack);
-        let given = reference.into_iter().zip(deflection).zip(direction);
-        for (((to, row), slack), ((reference, deflection), direction)) in dofs.zip(given) {
+        let dofs = self.transmission.dofs().iter().zip(&self.rows).zip(slack);
+        let given = reference.into_iter().zip(direction);
+        let dofs = steady.iter_mut().zip(dofs).zip(given);
+        for ((to, ((dof, row), slack)), (reference, direction)) in dofs {
+            let deflection = dof.deflection(row, direction);
             let linear: f64 = row.iter().take(SHARED + OWN).sum();
             let constant = row.get(OFFSET).copied().unwrap_or(0.0);
             for _ in 0..SLIDES {
@@ -367,28 +346,21 @@ impl<const N: usize> VectorLaw<N> {
         let mut step = only(members, subtract(self.target, self.plays.command));
         // Never against the reference.
         let against = dot(step, motion).min(0.0) / (moved * moved);
-        step.iter_mut()
-            .zip(motion)
-            .for_each(|(step, motion)| *step -= against * motion);
+        step = zip_with(step, motion, |step, motion| step - against * motion);
         let length = norm(step);
         if length == 0.0 {
             return step;
         }
         let mut share = ((gain * moved).min(moved + surplus) / length).min(1.0);
-        for (step, (limit, unit)) in step
-            .iter()
-            .zip(self.step_limit.into_iter().zip(self.transmission.unit()))
-        {
-            share = share.min(limit / (step.abs() * unit));
+        let dofs = step.iter().zip(self.step_limit);
+        for ((step, limit), dof) in dofs.zip(self.transmission.dofs()) {
+            share = share.min(limit / (step.abs() * dof.unit));
         }
         let now = self.plays.tip(&self.rows, members);
         let room = moved.max(dot(subtract(reference, now), motion) / moved);
         for _ in 0..STEPS {
             let mut there = self.plays;
-            let mut to = there.command;
-            to.iter_mut()
-                .zip(step)
-                .for_each(|(to, step)| *to += share * step);
+            let to = zip_with(there.command, step, |to, step| to + share * step);
             self.transmission.move_group(&mut there, members, &to);
             let change = subtract(there.tip(&self.rows, members), now);
             let tip = norm(change);
@@ -403,39 +375,25 @@ impl<const N: usize> VectorLaw<N> {
         step.map(|step| share * step)
     }
 
-    /// Uses this share of the compensation: all with 1, none with 0. Bumpless.
-    pub const fn set_share(&mut self, share: f64) {
-        self.share = share;
-    }
-
     /// Counts the reference from elsewhere by `shift` (N,); the command stays.
     pub fn shift_reference(&mut self, shift: [f64; N]) {
         if let Some(reference) = &mut self.reference {
-            for ((reference, lead), shift) in reference.iter_mut().zip(&mut self.lead).zip(shift) {
-                *reference += shift;
-                *lead -= shift;
-            }
+            *reference = zip_with(*reference, shift, |reference, shift| reference + shift);
+            self.lead = subtract(self.lead, shift);
         }
     }
 }
 
-fn subtract<const N: usize>(mut a: [f64; N], b: [f64; N]) -> [f64; N] {
-    a.iter_mut().zip(b).for_each(|(a, b)| *a -= b);
-    a
+fn subtract<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    zip_with(a, b, |a, b| a - b)
 }
 
-fn over<const N: usize>(mut a: [f64; N], b: [f64; N]) -> [f64; N] {
-    a.iter_mut().zip(b).for_each(|(a, b)| *a /= b);
-    a
+fn over<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    zip_with(a, b, |a, b| a / b)
 }
 
-fn only<const N: usize>(members: [bool; N], mut vector: [f64; N]) -> [f64; N] {
-    vector
-        .iter_mut()
-        .zip(members)
-        .filter(|(_, own)| !own)
-        .for_each(|(value, _)| *value = 0.0);
-    vector
+fn only<const N: usize>(members: [bool; N], vector: [f64; N]) -> [f64; N] {
+    zip_with(vector, members, |value, own| if own { value } else { 0.0 })
 }
 
 fn dot<const N: usize>(weight: [f64; N], a: [f64; N], b: [f64; N]) -> f64 {

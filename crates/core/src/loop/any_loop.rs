@@ -1,14 +1,14 @@
 //! Loops as objects, whose number of DOFs and profile are known at run time.
 
 use crate::article::play::Play;
-use crate::error::ConfigError;
+use crate::error::{ConfigError, require};
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
-use crate::r#loop::profile::{BandProfile, Profile};
+use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{GeometryEstimate, Report, SlackEstimate};
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::Supervision;
+use crate::supervision::supervisor::Supervision;
 
 /// Most DOFs of a loop.
 pub const DOFS: usize = 8;
@@ -45,25 +45,29 @@ pub trait Loop {
     /// State of the supervision.
     fn supervision(&self) -> Supervision;
 
-    /// As [`HysteresisReduction::set_compensation`].
+    /// Use this share of the compensation: all with 1, none with 0. Bumpless: the command rests while the reference rests.
     ///
     /// # Errors
-    /// The share is not from 0 to 1.
+    /// The share is not from 0 to 1; the loop is unchanged.
     fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError>;
 
-    /// As [`HysteresisReduction::engage`].
+    /// Re-engage the operator input: motion continues from rest, with the next increment of the reference.
     fn engage(&mut self);
 
-    /// As [`HysteresisReduction::acknowledge`].
+    /// Acknowledge the warnings.
     fn acknowledge(&mut self);
 
-    /// As [`HysteresisReduction::raise`].
+    /// Raise a flag that only the rig can detect.
     fn raise(&mut self, flag: Flag);
 }
 
-/// A loop of the article's instrument, with the functions of [`HysteresisReduction`] for its bands.
-#[expect(missing_docs, reason = "at the functions of the loop")]
+/// A loop of the article's instrument.
 pub trait BandLoop: Loop {
+    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
+    ///
+    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
+    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
     fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -72,8 +76,15 @@ pub trait BandLoop: Loop {
         checksum: Option<u64>,
     ) -> Report;
 
+    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
+    /// detection, corrected by the last images.
+    ///
+    /// None beyond the history.
     fn predict_state(&self, captured_at: f64) -> Option<Belief>;
 
+    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
+    ///
+    /// None beyond the history and where a band is not visible.
     fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]>;
 
     /// What images say of the geometry; None in profile `paper`.
@@ -127,47 +138,26 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 
     fn supervision(&self) -> Supervision {
-        Self::supervision(self)
+        self.monitors.supervision()
     }
 
     fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
-        Self::set_compensation(self, share)
+        let is_share = (0.0..=1.0).contains(&share);
+        require(is_share, "compensation", share, "a share from 0 to 1")?;
+        self.monitors.choose_share(&mut self.profile, share);
+        Ok(())
     }
 
     fn engage(&mut self) {
-        Self::engage(self);
+        self.monitors.engage();
     }
 
     fn acknowledge(&mut self) {
-        Self::acknowledge(self);
+        self.monitors.acknowledge();
     }
 
     fn raise(&mut self, flag: Flag) {
-        Self::raise(self, flag);
-    }
-}
-
-impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for HysteresisReduction<P, S> {
-    fn on_features(
-        &mut self,
-        measured: Option<[f64; 4]>,
-        covariance: Option<&[[f64; 4]; 4]>,
-        captured_at: f64,
-        checksum: Option<u64>,
-    ) -> Report {
-        Self::on_features(self, measured, covariance, captured_at, checksum)
-    }
-
-    fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        Self::predict_state(self, captured_at)
-    }
-
-    fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
-        Self::predicted_features(self, captured_at)
-    }
-
-    fn geometry(&self) -> Option<GeometryEstimate> {
-        self.profile.geometry()
+        self.monitors.raise(flag);
     }
 }
 

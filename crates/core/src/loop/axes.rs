@@ -13,7 +13,7 @@ use crate::r#loop::best::Best;
 use crate::r#loop::image_update::Outcome;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::{Paper, StateEstimation};
-use crate::r#loop::profile::ProfileBlocks;
+use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
@@ -83,14 +83,11 @@ pub trait Axes: Loop {
 }
 
 /// A profile for any sensor of N DOFs: `Paper<N, StateFromSensor<N>>`, or `Best<N, N, 0, D>` with D = N `COEFFICIENTS`.
-#[expect(private_bounds, reason = "only this crate implements profiles")]
-pub trait SensorProfile<const N: usize>: SensorBlocks<N> {}
-
-impl<const N: usize, P: SensorBlocks<N>> SensorProfile<N> for P {}
-
-/// The parts of a profile for any sensor.
-pub(crate) trait SensorBlocks<const N: usize>: ProfileBlocks<N> {
+pub trait SensorProfile<const N: usize>: Profile<N> {
     /// A profile at rest.
+    ///
+    /// # Errors
+    /// A setting is out of range.
     fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError>;
 
     /// The measurement of a sensor at a tick of the history; None where its model sees nothing.
@@ -158,7 +155,7 @@ pub struct View<const N: usize> {
     innovation: [f64; VALUES],
 }
 
-impl<P: SensorBlocks<N>, const N: usize> Sight<P, N> for Reading<'_> {
+impl<P: SensorProfile<N>, const N: usize> Sight<P, N> for Reading<'_> {
     type View = View<N>;
 
     const IS_WHOLE: bool = false;
@@ -177,7 +174,7 @@ impl<P: SensorBlocks<N>, const N: usize> Sight<P, N> for Reading<'_> {
     }
 }
 
-impl<const N: usize, const D: usize> SensorBlocks<N> for Best<N, N, 0, D> {
+impl<const N: usize, const D: usize> SensorProfile<N> for Best<N, N, 0, D> {
     fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError> {
         Self::with_geometry(settings, limits, [], [SLACK_CHANGED; N], f64::NAN)
     }
@@ -193,7 +190,7 @@ impl<const N: usize, const D: usize> SensorBlocks<N> for Best<N, N, 0, D> {
         let found = observed.most_probable(reading, &prior, around(), price)?;
         let linear = observed.linearize(reading, &prior, found.used, &self.estimate.noise())?;
         let rows = compressed(linear);
-        let observable = determined(&rows.by_state, self.estimate.transmission().unit());
+        let observable = determined(&rows.by_state, self.estimate.transmission.unit());
         let used = found.used.iter().filter(|used| **used).count();
         #[expect(clippy::cast_precision_loss, reason = "small numbers")]
         let per_dof = N as f64 / used.max(N) as f64;
@@ -218,7 +215,7 @@ pub struct StateFromSensor<const N: usize> {
 
 impl<const N: usize> StateEstimation<N> for StateFromSensor<N> {}
 
-impl<const N: usize> SensorBlocks<N> for Paper<N, StateFromSensor<N>> {
+impl<const N: usize> SensorProfile<N> for Paper<N, StateFromSensor<N>> {
     fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError> {
         let unit = settings.transmission()?.unit();
         Self::with_estimation(&settings.dofs, limits, StateFromSensor { unit })

@@ -14,7 +14,7 @@ use crate::r#loop::best::{Best, ERRORS};
 use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
-use crate::r#loop::profile::{BandBlocks, BandsView, Image, Seen};
+use crate::r#loop::profile::{BandProfile, BandsView, Image, Seen};
 use crate::r#loop::report::GeometryEstimate;
 use crate::r#loop::settings::Settings;
 use crate::model::features::{FeatureModel, FeaturePrediction};
@@ -55,7 +55,7 @@ impl Sensor<3, 4, ERRORS> for FeatureModel {
     }
 }
 
-impl BandBlocks for Best {
+impl BandProfile for Best {
     fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
         let own = settings.estimation;
         let lasting = |std| GeometryPrior {

@@ -3,6 +3,7 @@
 use crate::article::estimator::{Trigger, Triggers};
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
+use crate::dof::zip_with;
 use crate::error::ConfigError;
 use crate::estimation::estimate::{Estimate, GeometryPrior};
 use crate::estimation::estimate_settings::EstimateSettings;
@@ -10,7 +11,7 @@ use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::Linear;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::{ProfileBlocks, Updated};
+use crate::r#loop::profile::{Profile, Updated};
 use crate::r#loop::report::SlackEstimate;
 use crate::r#loop::settings::LoopSettings;
 use crate::model::features::GEOMETRY;
@@ -68,18 +69,17 @@ pub struct Best<
 
 impl<const N: usize, const M: usize, const G: usize, const D: usize> Law<N> for Best<N, M, G, D> {
     fn command(&self) -> [f64; N] {
-        self.law.command()
+        self.law.command
     }
 
     fn propose(&mut self, reference: [f64; N]) -> [f64; N] {
-        self.law
-            .propose(reference, &self.rows, self.estimate.ratio())
+        self.law.propose(reference, &self.rows, self.estimate.ratio)
     }
 
     fn commit(&mut self, command: [f64; N]) {
         self.law.commit(command);
-        if self.estimate.origin().iter().any(|origin| origin.is_nan()) {
-            self.estimate.start(self.law.origin());
+        if self.estimate.origin.iter().any(|origin| origin.is_nan()) {
+            self.estimate.origin = self.law.origin;
         }
     }
 
@@ -88,11 +88,11 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Law<N> for 
     }
 
     fn set_share(&mut self, share: f64) {
-        self.law.set_share(share);
+        self.law.share = share;
     }
 }
 
-impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBlocks<N>
+impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
     for Best<N, M, G, D>
 {
     type Evidence = Linear<N, M, G>;
@@ -100,19 +100,19 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBloc
     const IS_COUPLED: bool = true;
 
     fn predicted_state(&self) -> [f64; N] {
-        self.estimate.tip(self.law.plays())
+        self.estimate.tip(&self.law.plays)
     }
 
     fn play(&self) -> [Play; N] {
-        let mut plays = self.slack.map(|slack| {
-            let [minus, plus] = slack.offsets();
-            Play::from_ordered(minus, plus)
-        });
-        for (play, limit) in plays.iter_mut().zip(self.limits) {
-            let [minus, plus] = limit.clamp(play.delta_minus(), play.delta_plus());
-            *play = Play::from_ordered(minus, plus);
-        }
-        plays
+        let offsets = zip_with(
+            self.slack.map(|own| own.offsets()),
+            self.limits,
+            |own, limit| {
+                let [minus, plus] = own;
+                limit.clamp(minus, plus)
+            },
+        );
+        offsets.map(|[minus, plus]| Play::from_ordered(minus, plus))
     }
 
     fn slack_estimate(&self) -> SlackEstimate<N> {
@@ -184,12 +184,11 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBloc
         self.rows = self.estimate.coefficients();
         self.slack = self.estimate.slack();
         let measured = measurement.state;
-        let has_changed = self
-            .prediction
-            .update(past.time, past.predicted_state, measured);
+        let (time, predicted) = (past.time, past.predicted_state);
+        let has_changed = self.prediction.update(time, predicted, measured);
         Updated {
             triggers: self.triggers(past),
-            raised: Flags::when(self.law.is_limited(), Flag::WidthLimit)
+            raised: Flags::when(self.law.is_limited, Flag::WidthLimit)
                 .union(Flags::when(has_changed, Flag::SlackChanged))
                 .union(Flags::when(self.is_geometry_off(), Flag::GeometryOff)),
         }
@@ -234,18 +233,15 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
             time: f64::NAN,
             plays: Plays::REST,
         };
+        let bounds = Bounds {
+            gain: dofs.map(|dof| dof.free_gain.min(dof.gain_limit)),
+            width_limit: settings.safety.width_limit,
+            speed: settings.safety.command_speed,
+            period: settings.control.period,
+            offsets: limits,
+        };
         Ok(Self {
-            law: VectorLaw::new(
-                settings.law,
-                transmission,
-                &Bounds {
-                    gain: dofs.map(|dof| dof.free_gain.min(dof.gain_limit)),
-                    width_limit: settings.safety.width_limit,
-                    speed: settings.safety.command_speed,
-                    period: settings.control.period,
-                    offsets: limits,
-                },
-            )?,
+            law: VectorLaw::new(settings.law, transmission, &bounds)?,
             newest: rest,
             older: [rest; PASTS],
             measured: Plays::REST,
@@ -295,14 +291,9 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
     /// The contacts in which each DOF was: there an image measures an offset.
     fn triggers(&self, past: &Entry<N>) -> [Triggers; N] {
         let mut triggers = [Triggers::default(); N];
-        let dofs = past
-            .command
-            .into_iter()
-            .zip(past.predicted_state)
-            .zip(self.estimate.origin());
-        for ((triggers, slack), ((command, tip), origin)) in
-            triggers.iter_mut().zip(&self.slack).zip(dofs)
-        {
+        let dofs = past.command.into_iter().zip(past.predicted_state);
+        let dofs = dofs.zip(self.estimate.origin).zip(&self.slack);
+        for (triggers, (((command, tip), origin), slack)) in triggers.iter_mut().zip(dofs) {
             let output = origin + (tip - origin) / slack.gain;
             let value = (command - output - slack.centre) / slack.half_width;
             triggers.minus = (value < -CONTACT).then_some(Trigger::Contact);

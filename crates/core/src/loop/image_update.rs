@@ -2,11 +2,13 @@
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
+use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
+use crate::r#loop::any_loop::BandLoop;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
-use crate::r#loop::profile::{BandBlocks, BandProfile, BandsView, Image, Profile, Seen, Updated};
+use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen, Updated};
 use crate::r#loop::reduction::HysteresisReduction;
-use crate::r#loop::report::{Report, Status};
+use crate::r#loop::report::{GeometryEstimate, Report, Status};
 use crate::r#loop::sight::Sight;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
@@ -201,13 +203,8 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 }
 
-impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
-    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
-    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
-    ///
-    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
-    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
-    pub fn on_features(
+impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for HysteresisReduction<P, S> {
+    fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
         covariance: Option<&[[f64; 4]; 4]>,
@@ -245,6 +242,24 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
         }
     }
 
+    fn predict_state(&self, captured_at: f64) -> Option<Belief> {
+        let past = self.history.at(captured_at)?;
+        Some(self.profile.predict(&self.history, &past))
+    }
+
+    fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
+        let past = self.history.at(captured_at)?;
+        let model = self.profile.feature_model(&self.view);
+        let prediction = model.predict(past.predicted_state)?;
+        Some(prediction.features)
+    }
+
+    fn geometry(&self) -> Option<GeometryEstimate> {
+        self.profile.geometry()
+    }
+}
+
+impl<P: BandProfile, S> HysteresisReduction<P, S> {
     /// The view of a frame that updated nothing.
     fn unseen(&self, predicted_state: [f64; 3]) -> BandsView {
         let model = self.profile.feature_model(&self.view);
@@ -270,7 +285,7 @@ struct Bands<'a> {
     image: Option<Image<'a>>,
 }
 
-impl<P: BandBlocks> Sight<P, 3> for Bands<'_> {
+impl<P: BandProfile> Sight<P, 3> for Bands<'_> {
     type View = BandsView;
 
     fn is_usable(&self) -> bool {

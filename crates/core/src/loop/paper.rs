@@ -14,7 +14,7 @@ use crate::estimation::history::{Entry, History};
 use crate::estimation::state_prediction::{StatePrediction, step_deviation};
 use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::{BandBlocks, BandsView, Image, ProfileBlocks, Seen, Updated};
+use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen, Updated};
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
@@ -96,7 +96,7 @@ impl<const N: usize, E> Law<N> for Paper<N, E> {
     }
 }
 
-impl<const N: usize, E: StateEstimation<N>> ProfileBlocks<N> for Paper<N, E> {
+impl<const N: usize, E: StateEstimation<N>> Profile<N> for Paper<N, E> {
     /// Standard deviation of the state estimate.
     type Evidence = [f64; N];
 
@@ -150,7 +150,7 @@ impl<const N: usize, E: StateEstimation<N>> ProfileBlocks<N> for Paper<N, E> {
     }
 }
 
-impl BandBlocks for Paper {
+impl BandProfile for Paper {
     fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
         let dofs = settings.dofs();
         let estimation = StateFromImages(state_estimator(&dofs)?);

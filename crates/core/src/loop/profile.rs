@@ -15,18 +15,6 @@ use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
-/// A profile of the loop with N DOFs: `Paper` or `Best`.
-#[expect(private_bounds, reason = "only this crate implements profiles")]
-pub trait Profile<const N: usize = 3>: ProfileBlocks<N> {}
-
-impl<const N: usize, P: ProfileBlocks<N>> Profile<N> for P {}
-
-/// A profile of the article's instrument, which a camera sees by two bands.
-#[expect(private_bounds, reason = "only this crate implements profiles")]
-pub trait BandProfile: BandBlocks {}
-
-impl<P: BandBlocks> BandProfile for P {}
-
 /// An image: features (4,) in px with two NaN for a band that was not found, and their covariance (4, 4) in px^2, if known.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<'a> {
@@ -65,8 +53,9 @@ impl<const N: usize> Updated<N> {
     };
 }
 
-/// Compensation law, offset estimates and state estimation.
-pub(crate) trait ProfileBlocks<const N: usize>: Law<N> + Sized {
+/// A profile of the loop with N DOFs, `Paper` or `Best`: compensation law, offset estimates and state estimation. Only this crate
+/// has profiles.
+pub trait Profile<const N: usize = 3>: Law<N> + Sized {
     /// What an update needs of a measurement beside state and distance.
     type Evidence: Copy;
 
@@ -141,8 +130,8 @@ pub struct BandsView {
 /// A measurement of a profile, and what the image showed.
 pub type Seen<E> = (Measurement<3, E>, BandsView);
 
-/// The parts of a profile that know the article's instrument.
-pub(crate) trait BandBlocks: ProfileBlocks<3> {
+/// A profile of the article's instrument, which a camera sees by two bands.
+pub trait BandProfile: Profile {
     /// A profile at rest.
     ///
     /// # Errors

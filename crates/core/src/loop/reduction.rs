@@ -3,14 +3,12 @@
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, zip_with};
-use crate::error::{ConfigError, require};
-use crate::estimation::expectation::Belief;
+use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
 use crate::model::features::FeatureModel;
-use crate::supervision::flags::Flag;
-use crate::supervision::monitors::{Monitors, SENSORS, Supervision};
+use crate::supervision::monitors::{Monitors, SENSORS};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; measurements update the estimate of the hysteresis.
 ///
@@ -38,25 +36,6 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
         let of_loop = settings.of_loop()?;
         let make = |limits| P::new(settings, limits);
         Self::with_profile(&of_loop, make, settings.feature_model()?, storage)
-    }
-
-    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
-    /// detection, corrected by the last images.
-    ///
-    /// None beyond the history.
-    pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        let past = self.history.at(captured_at)?;
-        Some(self.profile.predict(&self.history, &past))
-    }
-
-    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
-    ///
-    /// None beyond the history and where a band is not visible.
-    pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
-        let past = self.history.at(captured_at)?;
-        let model = self.profile.feature_model(&self.view);
-        let prediction = model.predict(past.predicted_state)?;
-        Some(prediction.features)
     }
 }
 
@@ -109,11 +88,12 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         self.monitors
             .step(&mut self.profile, reference, stamp, time, limit);
         let (gated, command) = (self.monitors.reference(), self.profile.command());
+        let predicted_state = self.predicted_state();
         let distance = |to: f64, from: f64| (to - from).abs();
         let mut moved = zip_with(command, command_before, distance);
         if P::IS_COUPLED {
             // Where another DOF takes up the friction, a tip moves although its command rests.
-            let released = zip_with(self.predicted_state(), state_before, distance);
+            let released = zip_with(predicted_state, state_before, distance);
             moved = zip_with(moved, released, f64::max);
         }
         self.travel = zip_with(self.travel, moved, |travel, moved| {
@@ -123,7 +103,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             time,
             reference: gated,
             command,
-            predicted_state: self.predicted_state(),
+            predicted_state,
             corrected: self.profile.corrected(),
             travel: self.travel,
         });
@@ -143,36 +123,5 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     /// The estimated play of each DOF now.
     pub fn play(&self) -> [Play; N] {
         self.profile.play()
-    }
-
-    /// State of the supervision.
-    pub fn supervision(&self) -> Supervision {
-        self.monitors.supervision()
-    }
-
-    /// Use this share of the compensation: all with 1, none with 0. Bumpless: the command rests while the reference rests.
-    ///
-    /// # Errors
-    /// The share is not from 0 to 1; the loop is unchanged.
-    pub fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
-        let is_share = (0.0..=1.0).contains(&share);
-        require(is_share, "compensation", share, "a share from 0 to 1")?;
-        self.monitors.choose_share(&mut self.profile, share);
-        Ok(())
-    }
-
-    /// Re-engage the operator input: motion continues from rest, with the next increment of the reference.
-    pub fn engage(&mut self) {
-        self.monitors.engage();
-    }
-
-    /// Acknowledge the warnings.
-    pub const fn acknowledge(&mut self) {
-        self.monitors.acknowledge();
-    }
-
-    /// Raise a flag that only the rig can detect.
-    pub fn raise(&mut self, flag: Flag) {
-        self.monitors.raise(flag);
     }
 }

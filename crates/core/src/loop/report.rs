@@ -4,7 +4,7 @@ use crate::article::estimator::Triggers;
 use crate::article::play::Play;
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
-use crate::supervision::monitors::Supervision;
+use crate::supervision::supervisor::Supervision;
 
 /// Result of an image update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

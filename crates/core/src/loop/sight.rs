@@ -2,10 +2,10 @@
 
 use crate::estimation::history::Entry;
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::ProfileBlocks;
+use crate::r#loop::profile::Profile;
 
 /// What a sensor saw at one time, before a profile has looked at it.
-pub(crate) trait Sight<P: ProfileBlocks<N>, const N: usize> {
+pub(crate) trait Sight<P: Profile<N>, const N: usize> {
     /// What a report says of it.
     type View: Copy;
 

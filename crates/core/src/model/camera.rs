@@ -30,14 +30,8 @@ pub struct Projection {
     pub pixel: [f64; 2],
     /// `d pixel / d p_in_camera`, two rows in px/m.
     pub pixel_by_point: [Vector; 2],
-    folded: bool,
-}
-
-impl Projection {
     /// Whether the distortion mirrors the image here, which no lens does.
-    pub(crate) const fn is_folded(&self) -> bool {
-        self.folded
-    }
+    pub is_folded: bool,
 }
 
 impl Camera {
@@ -114,7 +108,7 @@ impl Camera {
             .then(|| Projection {
                 pixel,
                 pixel_by_point: [row(fx, x_by_x, x_by_y), row(fy, y_by_x, y_by_y)],
-                folded: determinant <= 0.0 || x_by_x + y_by_y <= 0.0,
+                is_folded: determinant <= 0.0 || x_by_x + y_by_y <= 0.0,
             })
     }
 }

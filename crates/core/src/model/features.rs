@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use crate::dof::{PerDof, all_finite};
 use crate::error::ConfigError;
 use crate::math::linear::{Vector, add, dot, scale};
-use crate::model::camera::{Camera, Pose};
+use crate::model::camera::{Camera, Pose, Projection};
 use crate::model::instrument::{Instrument, Marker};
 use crate::model::settings::{CameraSettings, InstrumentSettings};
 
@@ -33,7 +33,7 @@ pub const GEOMETRY: usize = 3;
 /// about 0.3 px, where the distortion varies strongly across a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureModel {
-    instrument: Instrument,
+    pub(crate) instrument: Instrument,
     camera: Camera,
     camera_from_guide: Pose,
 }
@@ -106,12 +106,6 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
-    /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`].
-    #[must_use]
-    pub const fn with_unevenness(&self, unevenness: f64) -> Self {
-        self.with_geometry([unevenness, 0.0, 0.0])
-    }
-
     /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`], in an image that is
     /// shifted by (u, v) px.
     #[must_use]
@@ -156,62 +150,38 @@ impl FeatureModel {
         Some([unevenness, [1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
     }
 
-    /// Radius and length of the bands in m.
-    pub(crate) const fn size(&self) -> (f64, f64) {
-        (self.instrument.radius(), self.instrument.band_length())
-    }
-
     /// Centre and axis of each band in the camera frame.
     pub(crate) fn axes(&self, state: PerDof<f64>) -> [(Vector, Vector); 2] {
-        self.instrument.markers(state).map(|marker| {
-            let pose = &self.camera_from_guide;
-            (pose.transform(marker.position), pose.rotate(marker.axis))
-        })
+        let markers = self.instrument.markers(state);
+        markers.map(|marker| self.seen(marker.position, marker.axis))
     }
 
-    /// Point and direction of the section's axis in the camera frame at a distance (m) from its distal end; None on the
-    /// shaft.
-    pub(crate) fn section_axis(
-        &self,
-        state: PerDof<f64>,
-        distance: f64,
-    ) -> Option<(Vector, Vector)> {
-        let (position, axis) = self.instrument.section(state, distance)?;
+    /// A point and a direction in the guide frame, in the camera frame.
+    pub(crate) fn seen(&self, point: Vector, direction: Vector) -> (Vector, Vector) {
         let pose = &self.camera_from_guide;
-        Some((pose.transform(position), pose.rotate(axis)))
+        (pose.transform(point), pose.rotate(direction))
     }
 
-    /// The image (u, v) in px of a point in the camera frame; None where it has none.
-    pub(crate) fn project(&self, point: Vector) -> Option<[f64; 2]> {
+    /// The image of a point in the camera frame; None where it has none.
+    pub(crate) fn project(&self, point: Vector) -> Option<Projection> {
         let projection = self.camera.project(point)?;
-        (!projection.is_folded()).then_some(projection.pixel)
-    }
-
-    /// Derivatives of the image (u, v) in px of a point in the camera frame by it (px/m); None where it has none.
-    pub(crate) fn pixel_by_point(&self, point: Vector) -> Option<[Vector; 2]> {
-        let projection = self.camera.project(point)?;
-        (!projection.is_folded()).then_some(projection.pixel_by_point)
+        (!projection.is_folded).then_some(projection)
     }
 
     /// The centroid (u, v) in px of the image of a band, and the derivatives of u and v by each DOF.
     fn centroid(&self, marker: &Marker) -> Option<([f64; 2], [PerDof<f64>; 2])> {
+        let (centre, axis) = self.seen(marker.position, marker.axis);
+        let rotated = |by: PerDof<Vector>| by.map(|by| self.camera_from_guide.rotate(by));
         let centre = Differentiated {
-            value: self.camera_from_guide.transform(marker.position),
-            by_dof: marker
-                .position_by_dof
-                .map(|by| self.camera_from_guide.rotate(by)),
+            value: centre,
+            by_dof: rotated(marker.position_by_dof),
         };
         let axis = Differentiated {
-            value: self.camera_from_guide.rotate(marker.axis),
-            by_dof: marker
-                .axis_by_dof
-                .map(|by| self.camera_from_guide.rotate(by)),
+            value: axis,
+            by_dof: rotated(marker.axis_by_dof),
         };
         let point = self.visible_point(&centre, &axis)?;
-        let projection = self.camera.project(point.value)?;
-        if projection.is_folded() {
-            return None;
-        }
+        let projection = self.project(point.value)?;
         let by_dof = projection
             .pixel_by_point
             .map(|row| point.by_dof.map(|by| dot(row, by)));
@@ -224,7 +194,7 @@ impl FeatureModel {
         centre: &Differentiated,
         axis: &Differentiated,
     ) -> Option<Differentiated> {
-        let (radius, length) = (self.instrument.radius(), self.instrument.band_length());
+        let (radius, length) = (self.instrument.radius, self.instrument.band_length);
         let (p, t) = (centre.value, axis.value);
         let along = dot(p, t);
         let across = add(scale(-1.0, p), along, t);

@@ -50,7 +50,8 @@ impl FeatureModel {
         deviation: &GeometryDeviation,
     ) -> Option<[[f64; 4]; ERRORS]> {
         let [(a, axis_a), (b, axis_b)] = self.axes(state);
-        let ([ua, va], [ub, vb]) = (self.pixel_by_point(a)?, self.pixel_by_point(b)?);
+        let [ua, va] = self.project(a)?.pixel_by_point;
+        let [ub, vb] = self.project(b)?.pixel_by_point;
         let column = |by_a: Vector, by_b: Vector| {
             [dot(ua, by_a), dot(va, by_a), dot(ub, by_b), dot(vb, by_b)]
         };

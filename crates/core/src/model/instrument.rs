@@ -16,8 +16,10 @@ use crate::math::linear::{Vector, sinc, sinc_slope};
 pub struct Instrument {
     bending_length: f64,
     markers: [f64; 2],
-    radius: f64,
-    band_length: f64,
+    /// Radius of the tip in m.
+    pub(crate) radius: f64,
+    /// Length of a band along the axis in m.
+    pub(crate) band_length: f64,
     unevenness: f64,
 }
 
@@ -107,16 +109,6 @@ impl Instrument {
     /// Length of the displacement of the tip across the chord per unevenness, in m.
     pub(crate) fn across(&self, bending: f64) -> f64 {
         self.bending_length * sinc_slope(bending / 2.0)
-    }
-
-    /// Radius of the tip in m.
-    pub(crate) const fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// Length of a band along the axis in m.
-    pub(crate) const fn band_length(&self) -> f64 {
-        self.band_length
     }
 
     /// Point and unit tangent of the section's axis in the guide frame at a distance (m) from its distal end; None if that is

@@ -46,7 +46,7 @@ impl FeatureModel {
     }
 
     fn band(&self, (centre, axis): (Vector, Vector)) -> Option<BandImage> {
-        let (radius, length) = self.size();
+        let (radius, length) = (self.instrument.radius, self.instrument.band_length);
         let across = add(scale(-1.0, centre), dot(centre, axis), axis);
         let distance = libm::sqrt(dot(across, across));
         if distance.is_nan() || distance <= radius {
@@ -67,8 +67,7 @@ impl FeatureModel {
             let (sin, cos) = libm::sincos(horizon * share);
             let rim = add(centre, end * length, axis);
             let point = add(add(rim, radius * cos, towards), radius * sin, beside);
-            let projection = self.project(point)?;
-            *corner = projection;
+            *corner = self.project(point)?.pixel;
         }
         moments(&outline)
     }

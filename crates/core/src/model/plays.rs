@@ -1,6 +1,6 @@
 //! Plays of fixed radii: the regressors of the tip.
 
-use crate::dof::Friction;
+use crate::dof::{Friction, try_each};
 use crate::error::{ConfigError, require_positive};
 
 /// Plays of a DOF that are of its friction group: vector plays where several DOFs share a friction.
@@ -37,11 +37,17 @@ const EXACT: f64 = 1e-9;
 /// Regressors of a DOF, or their coefficients.
 pub type Row = [f64; COEFFICIENTS];
 
-/// Outputs of the plays of N DOFs, in units of the DOF from the first reference, and the command that they follow.
+/// Outputs of the plays of a DOF, in its unit from the first reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Outputs {
+    shared: Lanes,
+    own: [f64; OWN],
+}
+
+/// Outputs of the plays of N DOFs, and the command that they follow, in units of the DOF from the first reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plays<const N: usize> {
-    shared: [[f64; SHARED]; N],
-    own: [[f64; OWN]; N],
+    outputs: [Outputs; N],
     /// The command.
     pub command: [f64; N],
     /// Travel of the command so far, summed over the DOFs.
@@ -51,8 +57,10 @@ pub struct Plays<const N: usize> {
 impl<const N: usize> Plays<N> {
     /// All plays at rest at the origin.
     pub const REST: Self = Self {
-        shared: [[0.0; SHARED]; N],
-        own: [[0.0; OWN]; N],
+        outputs: [Outputs {
+            shared: [0.0; SHARED],
+            own: [0.0; OWN],
+        }; N],
         command: [0.0; N],
         travel: 0.0,
     };
@@ -63,43 +71,37 @@ impl<const N: usize> Plays<N> {
     /// phi = (shared plays, own plays p, max(p - knot, 0) of every second own play, 1)
     /// ```
     pub fn regressors(&self) -> [Row; N] {
-        let mut rows = [[0.0; COEFFICIENTS]; N];
-        for (row, dof) in rows.iter_mut().zip(self.dofs()) {
-            *row = regressors(dof);
-        }
-        rows
+        self.outputs.each_ref().map(Outputs::regressors)
     }
 
     /// Regressors times coefficients of each of some DOFs, 0 for the others.
     #[inline]
     pub fn tip(&self, rows: &[Row; N], members: [bool; N]) -> [f64; N] {
         let mut tip = [0.0; N];
-        let dofs = tip.iter_mut().zip(self.dofs()).zip(rows).zip(members);
+        let dofs = tip.iter_mut().zip(&self.outputs).zip(rows).zip(members);
         for (((tip, dof), row), _) in dofs.filter(|(_, member)| *member) {
-            *tip = product(&regressors(dof), row);
+            *tip = product(&dof.regressors(), row);
         }
         tip
     }
-
-    fn dofs(&self) -> impl Iterator<Item = (&[f64; SHARED], &[f64; OWN])> {
-        self.shared.iter().zip(&self.own)
-    }
 }
 
-#[inline]
-fn regressors((shared, own): (&[f64; SHARED], &[f64; OWN])) -> Row {
-    let mut row = [1.0; COEFFICIENTS];
-    let (plays, rest) = row.split_at_mut(SHARED);
-    plays.copy_from_slice(shared);
-    let (plays, curved) = rest.split_at_mut(OWN);
-    plays.copy_from_slice(own);
-    let bent = curved.chunks_exact_mut(KNOTS.len());
-    for (bent, play) in bent.zip(own.iter().step_by(2)) {
-        for (entry, knot) in bent.iter_mut().zip(KNOTS) {
-            *entry = (play - knot).max(0.0);
+impl Outputs {
+    #[inline]
+    fn regressors(&self) -> Row {
+        let mut row = [1.0; COEFFICIENTS];
+        let (plays, rest) = row.split_at_mut(SHARED);
+        plays.copy_from_slice(&self.shared);
+        let (plays, curved) = rest.split_at_mut(OWN);
+        plays.copy_from_slice(&self.own);
+        let bent = curved.chunks_exact_mut(KNOTS.len());
+        for (bent, play) in bent.zip(self.own.iter().step_by(2)) {
+            for (entry, knot) in bent.iter_mut().zip(KNOTS) {
+                *entry = (play - knot).max(0.0);
+            }
         }
+        row
     }
-    row
 }
 
 /// The plays of N DOFs, some of which share a friction.
@@ -120,13 +122,20 @@ fn regressors((shared, own): (&[f64; SHARED], &[f64; OWN])) -> Row {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transmission<const N: usize> {
     friction: Friction<N>,
-    unit: [f64; N],
-    /// Half widths of the shared plays.
-    half: [[f64; SHARED]; N],
-    inverse_half: [[f64; SHARED]; N],
+    dofs: [Radii; N],
+}
+
+/// Half widths of the plays of a DOF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radii {
+    /// Unit of the DOF [m or rad].
+    pub unit: f64,
+    /// Whether it shares its friction with none.
+    pub is_alone: bool,
+    shared: Lanes,
+    inverse: Lanes,
     /// Motion of a sliding output by the same force, over that of the first DOF of the group.
-    ease: [[f64; SHARED]; N],
-    is_alone: [bool; N],
+    ease: Lanes,
 }
 
 impl<const N: usize> Transmission<N> {
@@ -135,68 +144,43 @@ impl<const N: usize> Transmission<N> {
     /// # Errors
     /// A unit is not a finite number above 0.
     pub fn new(friction: Friction<N>, unit: [f64; N]) -> Result<Self, ConfigError> {
-        for value in unit {
-            require_positive("expected_width", value)?;
-        }
-        let (mut half, mut ease) = ([ALONE_RADII; N], [[1.0; SHARED]; N]);
-        let mut is_alone = [true; N];
+        let mut dofs = try_each(unit, |unit| {
+            require_positive("expected_width", unit)?;
+            Ok(Radii::new(unit, true, ALONE_RADII, [1.0; SHARED]))
+        })?;
         for group in 0..N {
             let members = friction.members(group);
             if members.iter().filter(|own| **own).count() < 2 {
                 continue;
             }
             let mut first = None;
-            let dofs = half.iter_mut().zip(&mut ease).zip(&mut is_alone);
-            let sizes = unit.into_iter().zip(friction.lever()).zip(members);
-            for (((half, ease), is_alone), ((unit, lever), _)) in
-                dofs.zip(sizes).filter(|(_, (_, own))| *own)
-            {
-                *is_alone = false;
-                *half = if first.is_none() {
-                    VECTOR_RADII
-                } else {
-                    SIDE_RADII
-                };
-                let surface = lever * unit;
+            let own = dofs.iter_mut().zip(friction.lever()).zip(members);
+            for ((dof, lever), _) in own.filter(|(_, own)| *own) {
+                let half = first.map_or(VECTOR_RADII, |_| SIDE_RADII);
+                let surface = lever * dof.unit;
                 let base = *first.get_or_insert(surface);
-                for ((ease, half), radius) in ease.iter_mut().zip(*half).zip(VECTOR_RADII) {
-                    *ease = base * radius / (surface * half);
-                }
+                let ease = map(&VECTOR_RADII, &half, |radius, half| {
+                    base * radius / (surface * half)
+                });
+                *dof = Radii::new(dof.unit, false, half, ease);
             }
         }
-        Ok(Self {
-            friction,
-            unit,
-            inverse_half: half.map(|half| half.map(|half| 1.0 / half)),
-            half,
-            ease,
-            is_alone,
-        })
+        Ok(Self { friction, dofs })
     }
 
-    /// Whether each DOF shares its friction with none.
-    pub const fn is_alone(&self) -> [bool; N] {
-        self.is_alone
+    /// Radii of the plays of each DOF.
+    pub const fn dofs(&self) -> &[Radii; N] {
+        &self.dofs
     }
 
     /// Units of the DOFs [m or rad].
-    pub const fn unit(&self) -> [f64; N] {
-        self.unit
+    pub fn unit(&self) -> [f64; N] {
+        self.dofs.each_ref().map(|dof| dof.unit)
     }
 
     /// Which DOFs share a friction.
     pub const fn friction(&self) -> &Friction<N> {
         &self.friction
-    }
-
-    /// Radii of the plays of each DOF, in the order of the regressors.
-    pub fn radii(&self) -> [[f64; SHARED + OWN]; N] {
-        let mut radii = [[0.0; SHARED + OWN]; N];
-        for (radii, half) in radii.iter_mut().zip(self.half) {
-            let all = half.into_iter().chain(OWN_RADII);
-            radii.iter_mut().zip(all).for_each(|(a, b)| *a = b);
-        }
-        radii
     }
 
     /// The plays after a straight motion of the command to `to` (N,), in units.
@@ -215,35 +199,32 @@ impl<const N: usize> Transmission<N> {
 
     /// Moves the plays of the DOFs of one friction group to a command (N,), in units.
     pub fn move_group(&self, plays: &mut Plays<N>, members: [bool; N], to: &[f64; N]) {
-        let Plays { shared, own, .. } = plays;
-        let parts = self.half.iter().zip(self.is_alone);
         let mut is_together = false;
-        let dofs = shared.iter_mut().zip(own).zip(parts).zip(to).zip(members);
-        for ((((shared, own), (half, is_alone)), to), _) in dofs.filter(|(_, member)| *member) {
-            follow(own, &OWN_RADII, *to);
-            if is_alone {
-                follow(shared, half, *to);
+        let dofs = plays.outputs.iter_mut().zip(&self.dofs).zip(to);
+        for (((outputs, dof), to), _) in dofs.zip(members).filter(|(_, own)| *own) {
+            follow(&mut outputs.own, &OWN_RADII, *to);
+            if dof.is_alone {
+                follow(&mut outputs.shared, &dof.shared, *to);
             } else {
                 is_together = true;
             }
         }
         if is_together {
-            self.slide(members, to, shared);
+            self.slide(members, to, &mut plays.outputs);
         }
     }
 
     /// Vector plays of the DOFs of one group.
-    fn slide(&self, members: [bool; N], to: &[f64; N], shared: &mut [Lanes; N]) {
+    fn slide(&self, members: [bool; N], to: &[f64; N], outputs: &mut [Outputs; N]) {
         let mut free = [[0.0; SHARED]; N];
         let (mut square, mut largest) = ([0.0; SHARED], [0.0; SHARED]);
-        let parts = free.iter_mut().zip(&*shared).zip(to);
-        let own = self.inverse_half.iter().zip(&self.ease).zip(members);
-        for (((free, play), to), ((inverse, ease), _)) in
-            parts.zip(own).filter(|(_, (_, own))| *own)
-        {
-            *free = map(play, inverse, |play, inverse| (to - play) * inverse);
+        let dofs = free.iter_mut().zip(&self.dofs).zip(&*outputs).zip(to);
+        for ((((free, dof), output), to), _) in dofs.zip(members).filter(|(_, own)| *own) {
+            *free = map(&output.shared, &dof.inverse, |play, inverse| {
+                (to - play) * inverse
+            });
             square = map(&square, free, |square, free| square + free * free);
-            largest = map(&largest, ease, f64::max);
+            largest = map(&largest, &dof.ease, f64::max);
         }
         if square.iter().all(|square| *square <= 1.0) {
             return;
@@ -255,8 +236,8 @@ impl<const N: usize> Transmission<N> {
         });
         for _ in 0..STEPS {
             let (mut value, mut slope) = ([-1.0; SHARED], [0.0; SHARED]);
-            let dofs = free.iter().zip(&self.ease).zip(members);
-            for ((free, ease), _) in dofs.filter(|(_, own)| *own) {
+            let dofs = free.iter().zip(&self.dofs).zip(members);
+            for ((free, Radii { ease, .. }), _) in dofs.filter(|(_, own)| *own) {
                 let part = map(ease, &multiplier, |ease, l| 1.0 / (1.0 + ease * l));
                 let scaled = map(free, &part, |free, part| free * part);
                 let term = map(&scaled, &scaled, |a, b| a * b);
@@ -278,35 +259,42 @@ impl<const N: usize> Transmission<N> {
                 break;
             }
         }
-        let parts = free.iter().zip(shared).zip(to);
-        let own = self.half.iter().zip(&self.ease).zip(members);
-        for (((free, play), to), ((half, ease), _)) in parts.zip(own).filter(|(_, (_, own))| *own) {
-            let part = map(ease, &multiplier, |ease, l| 1.0 + ease * l);
-            let back = map(half, free, |half, free| half * free);
+        let dofs = free.iter().zip(&self.dofs).zip(outputs).zip(to);
+        for ((((free, dof), output), to), _) in dofs.zip(members).filter(|(_, own)| *own) {
+            let part = map(&dof.ease, &multiplier, |ease, l| 1.0 + ease * l);
+            let back = map(&dof.shared, free, |half, free| half * free);
             let back = map(&back, &part, |back, part| back / part);
-            let own = play.iter_mut().zip(back).zip(square);
+            let own = output.shared.iter_mut().zip(back).zip(square);
             for ((play, back), square) in own {
                 *play = if square > 1.0 { to - back } else { *play };
             }
         }
     }
+}
 
-    /// Sum of radius times coefficient while the tip slides steadily along `direction` (N,), of which every group has the
-    /// length 1 in the motion of its surface, or 0: command less tip over the gain, but for offset and bends.
-    pub fn deflection(&self, rows: &[Row; N], direction: &[f64; N]) -> [f64; N] {
-        let mut sums = [0.0; N];
-        let dofs = sums.iter_mut().zip(rows).zip(&self.half).zip(direction);
-        for (((sum, row), half), direction) in dofs {
-            let shared: f64 = row.iter().zip(half).map(|(w, h)| w * h).sum();
-            let own: f64 = row
-                .iter()
-                .skip(SHARED)
-                .zip(OWN_RADII)
-                .map(|(w, r)| w * r)
-                .sum();
-            *sum = shared * direction + own * sign(*direction);
+impl Radii {
+    fn new(unit: f64, is_alone: bool, shared: Lanes, ease: Lanes) -> Self {
+        Self {
+            unit,
+            is_alone,
+            shared,
+            inverse: shared.map(|half| 1.0 / half),
+            ease,
         }
-        sums
+    }
+
+    /// In the order of the regressors.
+    pub fn all(&self) -> impl Iterator<Item = f64> + Clone {
+        self.shared.into_iter().chain(OWN_RADII)
+    }
+
+    /// Sum of radius times coefficient while the tip slides steadily along `direction`, which is of length 1 in the motion of
+    /// the surface of its group, or 0: command less tip over the gain, but for offset and bends.
+    pub fn deflection(&self, row: &Row, direction: f64) -> f64 {
+        let shared: f64 = row.iter().zip(self.shared).map(|(w, h)| w * h).sum();
+        let own = row.iter().skip(SHARED).zip(OWN_RADII);
+        let own: f64 = own.map(|(w, r)| w * r).sum();
+        shared * direction + own * sign(direction)
     }
 }
 
@@ -351,22 +339,20 @@ pub fn bent(row: &Row, to: f64, direction: f64) -> (f64, f64) {
 
 /// Coefficients whose sum is the gain of a DOF: those of all plays, and of the bent ones their mean slope from -1 to 1.
 pub fn gain_row() -> Row {
-    let slopes = (0..OWN / 2).flat_map(|_| KNOTS.map(|knot: f64| (1.0 - knot) / 2.0));
-    let mut row = [0.0; COEFFICIENTS];
-    let values = [1.0; SHARED + OWN].into_iter().chain(slopes);
-    row.iter_mut().zip(values).for_each(|(a, b)| *a = b);
-    row
+    row_of(1.0, |knot| (1.0 - knot) / 2.0, 0.0)
 }
 
 /// Coefficients whose sum is the tip in the middle of the slack about the origin: offset, and of the bent plays the mean from -1 to 1.
 pub fn middle_row() -> Row {
-    let means = (0..OWN / 2).flat_map(|_| KNOTS.map(|knot: f64| (1.0 - knot) * (1.0 - knot) / 4.0));
-    let mut row = [0.0; COEFFICIENTS];
-    let values = means.chain([1.0]);
-    row.iter_mut()
-        .skip(SHARED + OWN)
-        .zip(values)
-        .for_each(|(a, b)| *a = b);
+    row_of(0.0, |knot| (1.0 - knot) * (1.0 - knot) / 4.0, 1.0)
+}
+
+/// The same of each play, by the knot of each bent play, and of the offset.
+fn row_of(play: f64, bent: impl Fn(f64) -> f64, offset: f64) -> Row {
+    let mut row = [play; COEFFICIENTS];
+    let bends = (0..OWN / 2).flat_map(|_| KNOTS.map(&bent));
+    let rest = row.iter_mut().skip(SHARED + OWN);
+    rest.zip(bends.chain([offset])).for_each(|(a, b)| *a = b);
     row
 }
 

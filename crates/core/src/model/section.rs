@@ -30,16 +30,17 @@ impl FeatureModel {
     ///
     /// Wrong where the section's curvature is not constant.
     pub fn section(&self, state: PerDof<f64>) -> [Option<SectionDisc>; SECTION_DISCS] {
-        let (radius, _) = self.size();
+        let radius = self.instrument.radius;
         let bands = self.axes(state).map(|(centre, _)| norm(centre));
         core::array::from_fn(|index| {
             #[expect(clippy::cast_precision_loss, reason = "a few discs")]
-            let (centre, axis) = self.section_axis(state, index as f64 * radius)?;
+            let (point, direction) = self.instrument.section(state, index as f64 * radius)?;
+            let (centre, axis) = self.seen(point, direction);
             let distance = norm(centre);
             let beside = cross(centre, axis);
             let across = scale(radius / norm(beside), beside);
-            let [u, v] = self.project(centre)?;
-            let [u1, v1] = self.project(add(centre, 1.0, across))?;
+            let [u, v] = self.project(centre)?.pixel;
+            let [u1, v1] = self.project(add(centre, 1.0, across))?.pixel;
             Some(SectionDisc {
                 centre: [u, v],
                 radius: libm::hypot(u1 - u, v1 - v),
@@ -51,28 +52,4 @@ impl FeatureModel {
 
 fn norm(vector: Vector) -> f64 {
     libm::sqrt(dot(vector, vector))
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::math::linear::{add, dot};
-    use crate::model::instrument::Instrument;
-
-    #[test]
-    fn tangent_is_the_derivative_of_the_axis_and_the_end_is_where_the_tip_begins() {
-        let at_end = Instrument::new(30e-3, 0.0, 0.0, 1.75e-3, 4e-3).unwrap();
-        for state in [[20e-3, 0.4, 1.6], [35e-3, -1.9, 0.0], [10e-3, 2.0, -0.2]] {
-            let [end, _] = at_end.markers(state);
-            assert_eq!(at_end.section(state, 0.0), Some((end.position, end.axis)));
-            for distance in [2e-3, 9e-3, 25e-3] {
-                let step = 1e-6;
-                let [near, here, far] =
-                    [-step, 0.0, step].map(|by| at_end.section(state, distance + by).unwrap());
-                let slope = add(near.0, -1.0, far.0).map(|value| value / (2.0 * step));
-                let error = add(slope, -1.0, here.1);
-                assert!(dot(error, error).sqrt() < 1e-6, "{state:?} {distance}");
-            }
-            assert_eq!(at_end.section(state, 31e-3), None);
-        }
-    }
 }

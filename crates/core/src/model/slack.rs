@@ -1,6 +1,6 @@
 //! Width, centre and gain of the slack that coefficients of plays make.
 
-use crate::model::plays::{OWN, Row, SHARED, Transmission, gain_row, middle_row, product};
+use crate::model::plays::{Radii, Row, SHARED, Transmission, gain_row, middle_row, product};
 
 /// Bounds of the gain: outside of them it is another instrument.
 pub const GAINS: (f64, f64) = (0.6, 1.3);
@@ -27,13 +27,12 @@ impl<const N: usize> Transmission<N> {
     /// Slack of each DOF that moves alone, for the coefficients of its plays.
     pub fn slack(&self, rows: &[Row; N]) -> [Slack; N] {
         let mut found = [Slack::default(); N];
-        let dofs = self.radii().into_iter().zip(rows).zip(self.unit());
-        for (slack, ((radii, row), unit)) in found.iter_mut().zip(dofs) {
+        for ((slack, dof), row) in found.iter_mut().zip(self.dofs()).zip(rows) {
             let gain = product(&gain_row(), row).clamp(GAINS.0, GAINS.1);
-            let half = product(&width_row(&radii), row) / gain;
+            let half = product(&dof.width_row(), row) / gain;
             *slack = Slack {
-                half_width: unit * half.max(0.0),
-                centre: -unit * product(&middle_row(), row) / gain,
+                half_width: dof.unit * half.max(0.0),
+                centre: -dof.unit * product(&middle_row(), row) / gain,
                 gain,
             };
         }
@@ -41,16 +40,15 @@ impl<const N: usize> Transmission<N> {
     }
 }
 
-/// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
-pub fn width_row(radii: &[f64; SHARED + OWN]) -> Row {
-    let mut row = gain_row();
-    let bent = radii
-        .iter()
-        .skip(SHARED)
-        .step_by(2)
-        .flat_map(|radius| [*radius; 3]);
-    row.iter_mut()
-        .zip(radii.iter().copied().chain(bent))
-        .for_each(|(entry, radius)| *entry *= radius);
-    row
+impl Radii {
+    /// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
+    pub fn width_row(&self) -> Row {
+        let mut row = gain_row();
+        let bent = self.all().skip(SHARED).step_by(2);
+        let radii = self.all().chain(bent.flat_map(|radius| [radius; 3]));
+        row.iter_mut()
+            .zip(radii)
+            .for_each(|(entry, radius)| *entry *= radius);
+        row
+    }
 }

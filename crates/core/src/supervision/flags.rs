@@ -4,14 +4,18 @@ macro_rules! flags {
     ($($(#[doc = $doc:literal])+ $flag:ident = $name:literal,)+) => {
         /// A condition that a monitor detected, or that the rig reported.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum Flag { $($(#[doc = $doc])+ $flag,)+ }
+        #[cfg_attr(
+            feature = "serde",
+            derive(serde::Deserialize),
+            serde(expecting = "the name of a flag")
+        )]
+        pub enum Flag {
+            $($(#[doc = $doc])+ #[cfg_attr(feature = "serde", serde(rename = $name))] $flag,)+
+        }
 
         impl Flag {
             /// Every flag, in the order of its bit in [`Flags`].
             pub const ALL: &[Self] = &[$(Self::$flag,)+];
-
-            #[cfg(feature = "serde")]
-            const NAMES: &[&str] = &[$($name,)+];
 
             /// The name in configuration, reports and logs.
             pub const fn name(self) -> &'static str {
@@ -146,29 +150,9 @@ impl Flags {
 
 #[cfg(feature = "serde")]
 mod deserialize {
-    use super::{Flag, Flags};
+    use super::Flags;
     use core::fmt;
-    use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
-
-    struct Name;
-
-    impl Visitor<'_> for Name {
-        type Value = Flag;
-
-        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-            formatter.write_str("the name of a flag")
-        }
-
-        fn visit_str<E: Error>(self, name: &str) -> Result<Flag, E> {
-            Flag::from_name(name).ok_or_else(|| E::unknown_variant(name, Flag::NAMES))
-        }
-    }
-
-    impl<'de> Deserialize<'de> for Flag {
-        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            deserializer.deserialize_str(Name)
-        }
-    }
+    use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 
     struct Names;
 
@@ -192,49 +176,5 @@ mod deserialize {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
             deserializer.deserialize_seq(Names)
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn flags_have_distinct_bits_and_names() {
-        let mut seen = Flags::NONE;
-        for flag in Flag::ALL {
-            assert!(!seen.contains(*flag));
-            seen = seen.union(Flags::of(*flag));
-            assert_eq!(Flag::from_name(flag.name()), Some(*flag));
-        }
-        assert!(seen.iter().eq(Flag::ALL.iter().copied()));
-        assert!(seen.difference(seen).is_empty());
-        assert_eq!(Flag::from_name("nothing"), None);
-    }
-
-    #[cfg(feature = "serde")]
-    #[test]
-    fn a_set_is_deserialized_from_names() {
-        use serde::de::Deserialize;
-        use serde::de::value::{Error, SeqDeserializer};
-        let flags = |names: &[&'static str]| {
-            Flags::deserialize(SeqDeserializer::<_, Error>::new(names.iter().copied()))
-        };
-        let lost_and_late = Flags::of(Flag::Lost).union(Flags::of(Flag::Late));
-        assert_eq!(flags(&["lost", "late"]), Ok(lost_and_late));
-        assert_eq!(flags(&[]), Ok(Flags::NONE));
-        assert!(flags(&["lost", "frost"]).is_err());
-    }
-
-    #[cfg(feature = "serde")]
-    #[test]
-    fn errors_of_type_state_what_is_expected() {
-        use serde::de::value::{Error, U32Deserializer};
-        use serde::de::{Deserialize, IntoDeserializer};
-        let number = || -> U32Deserializer<Error> { 1_u32.into_deserializer() };
-        let error = Flags::deserialize(number()).unwrap_err().to_string();
-        assert!(error.contains("a sequence of names of flags"), "{error}");
-        let error = Flag::deserialize(number()).unwrap_err().to_string();
-        assert!(error.contains("the name of a flag"), "{error}");
     }
 }

@@ -1,6 +1,7 @@
 //! Frame gate: whether a frame is used, by its times, by its image, and by the innovation (innovation gate).
 
-use crate::error::{ConfigError, require_positive};
+use crate::dof::zip_with;
+use crate::error::{ConfigError, require_all_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
@@ -49,17 +50,13 @@ impl<const N: usize> FrameGate<N> {
     /// A value is not a finite number above 0.
     pub fn new(safety: &SafetySettings<N>, dofs: &[DofSettings; N]) -> Result<Self, ConfigError> {
         let frozen_travel = dofs.map(|dof| dof.update_distance * safety.frozen_travel);
-        for (field, value) in [
-            ("frame_age", safety.frame_age),
-            ("frame_gap", safety.frame_gap),
-            ("clock_jump", safety.clock_jump),
-            ("innovation_limit", safety.innovation_limit),
-        ] {
-            require_positive(field, value)?;
-        }
-        for value in frozen_travel {
-            require_positive("frozen_travel", value)?;
-        }
+        require_all_positive(&[
+            ("frame_age", &[safety.frame_age]),
+            ("frame_gap", &[safety.frame_gap]),
+            ("clock_jump", &[safety.clock_jump]),
+            ("innovation_limit", &[safety.innovation_limit]),
+            ("frozen_travel", &frozen_travel),
+        ])?;
         Ok(Self {
             settings: *safety,
             frozen_travel,
@@ -106,11 +103,13 @@ impl<const N: usize> FrameGate<N> {
             return false;
         };
         match self.repeated {
-            Some((repeated, then)) if repeated == image => travel
-                .iter()
-                .zip(then)
-                .zip(self.frozen_travel)
-                .any(|((now, then), limit)| now - then >= limit),
+            Some((repeated, then)) if repeated == image => {
+                let moved = zip_with(travel, then, |now, then| now - then);
+                moved
+                    .iter()
+                    .zip(self.frozen_travel)
+                    .any(|(moved, limit)| *moved >= limit)
+            }
             _ => {
                 self.repeated = Some((image, travel));
                 false

@@ -1,6 +1,6 @@
 //! Monitor of the operator's input device: silence, and jumps that no operator makes.
 
-use crate::error::{ConfigError, require_positive};
+use crate::error::{ConfigError, require_all_positive};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
 
@@ -26,9 +26,7 @@ use crate::supervision::settings::SafetySettings;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputDeviceMonitor<const N: usize> {
     period: f64,
-    reference_speed: [f64; N],
-    reference_count: [f64; N],
-    reference_age: f64,
+    settings: SafetySettings<N>,
     /// v.
     speeds: [f64; N],
     /// T.
@@ -41,21 +39,15 @@ impl<const N: usize> InputDeviceMonitor<N> {
     /// # Errors
     /// A value is not a finite number above 0.
     pub fn new(safety: &SafetySettings<N>, period: f64) -> Result<Self, ConfigError> {
-        require_positive("period", period)?;
-        for (field, values) in [
-            ("reference_speed", safety.reference_speed),
-            ("reference_count", safety.reference_count),
-        ] {
-            for value in values {
-                require_positive(field, value)?;
-            }
-        }
-        require_positive("reference_age", safety.reference_age)?;
+        require_all_positive(&[
+            ("period", &[period]),
+            ("reference_speed", &safety.reference_speed),
+            ("reference_count", &safety.reference_count),
+            ("reference_age", &[safety.reference_age]),
+        ])?;
         Ok(Self {
             period,
-            reference_speed: safety.reference_speed,
-            reference_count: safety.reference_count,
-            reference_age: safety.reference_age,
+            settings: *safety,
             speeds: [0.0; N],
             repeated: [0.0; N],
         })
@@ -67,14 +59,20 @@ impl<const N: usize> InputDeviceMonitor<N> {
     pub fn update(&mut self, increments: [f64; N], elapsed: f64) -> Flags {
         let elapsed = elapsed.max(self.period);
         let axes = self.speeds.iter_mut().zip(&mut self.repeated);
-        let limits = self.reference_speed.into_iter().zip(self.reference_count);
+        let SafetySettings {
+            reference_speed,
+            reference_count,
+            reference_age,
+            ..
+        } = self.settings;
+        let limits = reference_speed.into_iter().zip(reference_count);
         let mut raised = Flags::NONE;
         for (((speed, repeated), increment), (limit, count)) in axes.zip(increments).zip(limits) {
             *repeated += elapsed;
             if increment == 0.0 {
                 continue;
             }
-            let was_silent = *repeated > self.reference_age;
+            let was_silent = *repeated > reference_age;
             let (expected, time, flag) = if was_silent {
                 (0.0, elapsed, Flag::ReferenceLate)
             } else {

@@ -13,23 +13,10 @@ use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
 use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
-use crate::supervision::supervisor::{Event, Supervisor};
+use crate::supervision::supervisor::{Event, Supervision, Supervisor};
 
 /// Sensors that a loop may have, each with its own rate and delay.
 pub const SENSORS: usize = 4;
-
-/// State of the supervision.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Supervision {
-    /// The reaction in force.
-    pub reaction: Reaction,
-    /// The flags that cause it.
-    pub flags: Flags,
-    /// The flags raised since the last acknowledgement.
-    pub latched: Flags,
-    /// Share of the compensation in use, 0 to 1.
-    pub lead: f64,
-}
 
 /// The law of N DOFs, as far as supervision wraps it.
 pub trait Law<const N: usize> {
@@ -118,7 +105,7 @@ impl<const N: usize> Monitors<N> {
         time: f64,
         limit: impl FnOnce([f64; N], [f64; N]) -> [f64; N],
     ) {
-        let is_held = self.supervisor.reaction() >= Reaction::HoldMotion;
+        let is_held = self.supervisor.now().reaction >= Reaction::HoldMotion;
         let gated = self.gate.step(reference, time, stamp, is_held, self.off);
         let mut event = Event {
             source: Source::Tick,
@@ -200,7 +187,7 @@ impl<const N: usize> Monitors<N> {
     }
 
     fn set_share<L: Law<N>>(&mut self, law: &mut L) {
-        let share = self.supervisor.gain_share();
+        let share = self.supervisor.now().lead;
         if (share - self.share).abs() > 0.0 {
             self.share = share;
             law.set_share(share * self.chosen);
@@ -210,7 +197,7 @@ impl<const N: usize> Monitors<N> {
     /// Use this share of the compensation, of which the supervisor allows a share.
     pub(crate) fn choose_share<L: Law<N>>(&mut self, law: &mut L, share: f64) {
         self.chosen = share;
-        law.set_share(share * self.supervisor.gain_share());
+        law.set_share(share * self.supervisor.now().lead);
     }
 
     /// Check a frame of one of the sensors on its arrival.
@@ -270,12 +257,12 @@ impl<const N: usize> Monitors<N> {
 
     /// Whether the compensation fades out.
     pub(crate) fn is_fading(&self) -> bool {
-        self.supervisor.reaction() == Reaction::Fade
+        self.supervisor.now().reaction == Reaction::Fade
     }
 
     /// Whether images may update the offsets.
     pub(crate) fn permits_updates(&self) -> bool {
-        self.supervisor.reaction() < Reaction::HoldEstimate
+        self.supervisor.now().reaction < Reaction::HoldEstimate
     }
 
     /// React to the flags of a frame.
@@ -310,12 +297,7 @@ impl<const N: usize> Monitors<N> {
     }
 
     /// State of the supervision now.
-    pub fn supervision(&self) -> Supervision {
-        Supervision {
-            reaction: self.supervisor.reaction(),
-            flags: self.supervisor.flags(),
-            latched: self.supervisor.latched(),
-            lead: self.supervisor.gain_share(),
-        }
+    pub const fn supervision(&self) -> Supervision {
+        self.supervisor.now()
     }
 }

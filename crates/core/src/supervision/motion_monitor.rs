@@ -2,7 +2,7 @@
 
 use crate::article::play::Play;
 use crate::dof::zip_with;
-use crate::error::{ConfigError, require, require_positive};
+use crate::error::{ConfigError, require, require_all_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
@@ -34,18 +34,7 @@ pub struct MotionMonitor<const N: usize> {
     axes: [DofMotion; N],
     /// exp(-period / 1 s).
     decay: f64,
-    tremor_rate: f64,
-    cycle_swings: u32,
-    stroke: StrokeLimits,
-}
-
-/// Limits of a stroke that all DOFs share.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct StrokeLimits {
-    ahead_ratio: f64,
-    offset_decrease: f64,
-    cycle_growth: f64,
-    cycle_time: f64,
+    settings: SafetySettings<N>,
 }
 
 impl<const N: usize> MotionMonitor<N> {
@@ -61,57 +50,39 @@ impl<const N: usize> MotionMonitor<N> {
         let tremor_swing = dofs.map(|dof| dof.update_distance * safety.tremor_swing);
         let turn = dofs.map(|dof| dof.update_distance);
         let ahead = safety.width_limit.map(|width| safety.ahead_limit * width);
-        for (field, lengths) in [
-            ("tremor_swing", tremor_swing),
-            ("width_limit", safety.width_limit),
-            ("update_distance", turn),
-            ("ahead_limit", ahead),
-        ] {
-            for length in lengths {
-                require_positive(field, length)?;
-            }
-        }
-        for (field, value) in [
-            ("period", period),
-            ("tremor_rate", safety.tremor_rate),
-            ("ahead_ratio", safety.ahead_ratio),
-            ("offset_decrease", safety.offset_decrease),
-            ("cycle_growth", safety.cycle_growth),
-            ("cycle_time", safety.cycle_time),
-        ] {
-            require_positive(field, value)?;
-        }
+        require_all_positive(&[
+            ("tremor_swing", &tremor_swing),
+            ("width_limit", &safety.width_limit),
+            ("update_distance", &turn),
+            ("ahead_limit", &ahead),
+            ("period", &[period]),
+            ("tremor_rate", &[safety.tremor_rate]),
+            ("ahead_ratio", &[safety.ahead_ratio]),
+            ("offset_decrease", &[safety.offset_decrease]),
+            ("cycle_growth", &[safety.cycle_growth]),
+            ("cycle_time", &[safety.cycle_time]),
+        ])?;
         let swings = safety.cycle_swings;
         require(swings > 0, "cycle_swings", f64::from(swings), "1 or above")?;
         let axes = dofs.map(|dof| DofMotion::new(&dof, safety.tremor_swing));
         Ok(Self {
-            axes: zip_with(axes, safety.width_limit, |axis, width| DofMotion {
-                width_limit: width,
-                ahead: safety.ahead_limit * width,
-                ..axis
-            }),
+            axes: zip_with(axes, ahead, |axis, ahead| DofMotion { ahead, ..axis }),
             decay: libm::exp(-period / TREMOR_TIME),
-            tremor_rate: safety.tremor_rate,
-            cycle_swings: swings,
-            stroke: StrokeLimits {
-                ahead_ratio: safety.ahead_ratio,
-                offset_decrease: safety.offset_decrease,
-                cycle_growth: safety.cycle_growth,
-                cycle_time: safety.cycle_time,
-            },
+            settings: *safety,
         })
     }
 
     /// Update with the gated reference of a control tick.
     pub fn update_reference(&mut self, reference: [f64; N]) -> Flags {
         let mut is_tremor = false;
-        for (axis, reference) in self.axes.iter_mut().zip(reference) {
+        let dofs = self.axes.iter_mut().zip(reference);
+        for ((axis, reference), width) in dofs.zip(self.settings.width_limit) {
             axis.reversals *= self.decay;
             let swing = axis.every_tick.update(reference);
-            if swing.is_some_and(|swing| swing < axis.width_limit) {
+            if swing.is_some_and(|swing| swing < width) {
                 axis.reversals += 1.0;
             }
-            is_tremor |= axis.reversals > self.tremor_rate;
+            is_tremor |= axis.reversals > self.settings.tremor_rate;
         }
         Flags::when(is_tremor, Flag::Tremor)
     }
@@ -129,11 +100,9 @@ impl<const N: usize> MotionMonitor<N> {
         let signals = reference.into_iter().zip(measured).zip(play);
         for (axis, ((reference, measured), play)) in self.axes.iter_mut().zip(signals) {
             if reference.is_finite() && measured.is_finite() {
-                is_ahead |= axis.update(time, reference, measured, play, &self.stroke);
-                cycles |= axis
-                    .growing
-                    .iter()
-                    .all(|each| each.count >= self.cycle_swings);
+                is_ahead |= axis.update(time, reference, measured, play, &self.settings);
+                let most = self.settings.cycle_swings;
+                cycles |= axis.growing.iter().all(|each| each.count >= most);
             }
         }
         Flags::when(is_ahead, Flag::Overcompensation).union(Flags::when(cycles, Flag::LimitCycle))
@@ -143,7 +112,6 @@ impl<const N: usize> MotionMonitor<N> {
 /// Motion of one DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct DofMotion {
-    width_limit: f64,
     ahead: f64,
     /// Turning points of the reference, by every control tick.
     every_tick: TurningPoints,
@@ -168,7 +136,6 @@ impl DofMotion {
             time: f64::NAN,
         };
         Self {
-            width_limit: f64::NAN,
             ahead: f64::NAN,
             every_tick: TurningPoints::new(dof.update_distance * tremor_swing),
             reversals: 0.0,
@@ -182,13 +149,13 @@ impl DofMotion {
     }
 
     /// Whether the tip has overtaken its reference, or the offset in use has decreased, in this stroke.
-    fn update(
+    fn update<const N: usize>(
         &mut self,
         time: f64,
         reference: f64,
         measured: f64,
         play: Play,
-        limits: &StrokeLimits,
+        limits: &SafetySettings<N>,
     ) -> bool {
         let [of_reference, of_tip] = &mut self.growing;
         if let Some(swing) = self.reference.update(reference) {
@@ -229,7 +196,7 @@ struct GrowingSwings {
 }
 
 impl GrowingSwings {
-    fn update(&mut self, time: f64, swing: f64, limits: &StrokeLimits) {
+    fn update<const N: usize>(&mut self, time: f64, swing: f64, limits: &SafetySettings<N>) {
         let grows =
             time - self.time <= limits.cycle_time && swing >= limits.cycle_growth * self.swing;
         self.count = if grows {

@@ -25,9 +25,7 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceGate<const N: usize> {
     period: f64,
-    reference_age: f64,
-    late_tick: f64,
-    stall: f64,
+    settings: SafetySettings<N>,
     limiter: ReferenceLimiter<N>,
     device: InputDeviceMonitor<N>,
     offset: [f64; N],
@@ -64,19 +62,13 @@ impl<const N: usize> ReferenceGate<N> {
         period: f64,
     ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
-        let is_late_tick = safety.late_tick.is_finite() && safety.late_tick > 1.0;
-        require(
-            is_late_tick,
-            "late_tick",
-            safety.late_tick,
-            "finite, above 1",
-        )?;
+        let late = safety.late_tick;
+        let is_late = late.is_finite() && late > 1.0;
+        require(is_late, "late_tick", late, "finite, above 1")?;
         require_positive("stall", safety.stall)?;
         Ok(Self {
             period,
-            reference_age: safety.reference_age,
-            late_tick: safety.late_tick,
-            stall: safety.stall,
+            settings: *safety,
             limiter: ReferenceLimiter::new(safety, dofs, period)?,
             device: InputDeviceMonitor::new(safety, period)?,
             offset: [0.0; N],
@@ -192,13 +184,16 @@ impl<const N: usize> ReferenceGate<N> {
     }
 
     fn check_times(&self, elapsed: f64, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
-        let is_late = elapsed > self.late_tick * self.period * (1.0 + ROUNDING);
+        let is_late = elapsed > self.settings.late_tick * self.period * (1.0 + ROUNDING);
         let has_jumped = !time.is_finite() || elapsed < 0.0;
         let age = stamp.map_or(0.0, |stamp| (time - stamp).abs());
-        let is_old = age.is_nan() || age > self.reference_age;
+        let is_old = age.is_nan() || age > self.settings.reference_age;
         let raised = Flags::when(is_late, Flag::LateTick)
             .union(Flags::when(has_jumped, Flag::Clock))
             .union(Flags::when(is_old, Flag::ReferenceLate));
-        (raised, Flags::when(elapsed > self.stall, Flag::LateTick))
+        (
+            raised,
+            Flags::when(elapsed > self.settings.stall, Flag::LateTick),
+        )
     }
 }

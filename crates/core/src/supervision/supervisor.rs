@@ -26,8 +26,8 @@ pub struct Event {
 /// slack.
 ///
 /// ```text
-/// gain_share <- gain_share - travel / fade_travel       while fading
-/// gain_share <- gain_share + travel / restore_travel    while nothing more severe than a warning is in force
+/// lead <- lead - travel / fade_travel       while fading
+/// lead <- lead + travel / restore_travel    while nothing more severe than a warning is in force
 /// ```
 ///
 /// is the share of the free gain in use, 0 to 1. It changes with motion only, never with time, so that nothing moves by
@@ -37,12 +37,22 @@ pub struct Event {
 pub struct Supervisor<const N: usize> {
     settings: SafetySettings<N>,
     active: [Option<ActiveFlag>; TABLE.len()],
-    reaction: Reaction,
-    flags: Flags,
-    latched: Flags,
-    gain_share: f64,
+    now: Supervision,
     time: f64,
     travel: f64,
+}
+
+/// State of the supervision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Supervision {
+    /// The reaction in force: the highest of all active flags.
+    pub reaction: Reaction,
+    /// The flags that cause it.
+    pub flags: Flags,
+    /// The flags raised or escalated since the last acknowledgement.
+    pub latched: Flags,
+    /// Share of the compensation in use, 0 to 1.
+    pub lead: f64,
 }
 
 /// The level of a flag's reaction, since when, and the good events in a row since the flag was raised last.
@@ -73,10 +83,12 @@ impl<const N: usize> Supervisor<N> {
         Ok(Self {
             settings: *settings,
             active: [None; TABLE.len()],
-            reaction: Reaction::None,
-            flags: Flags::NONE,
-            latched: Flags::NONE,
-            gain_share: 1.0,
+            now: Supervision {
+                reaction: Reaction::None,
+                flags: Flags::NONE,
+                latched: Flags::NONE,
+                lead: 1.0,
+            },
             time: f64::NEG_INFINITY,
             travel: 0.0,
         })
@@ -95,7 +107,7 @@ impl<const N: usize> Supervisor<N> {
         }
         self.travel += travel;
         // Without a flag, as in most ticks, there is nothing to update.
-        let flags = self.flags.union(event.raised).union(event.severe);
+        let flags = self.now.flags.union(event.raised).union(event.severe);
         if !flags.is_empty() {
             self.update_flags(event);
         }
@@ -106,21 +118,19 @@ impl<const N: usize> Supervisor<N> {
         let now = (self.time, self.travel);
         for (rule, active) in TABLE.iter().zip(&mut self.active) {
             if update_flag(active, rule, &self.settings, event, now) {
-                self.latched = self.latched.union(Flags::of(rule.flag));
+                self.now.latched = self.now.latched.union(Flags::of(rule.flag));
             }
         }
         self.summarize();
     }
 
     fn update_gain_share(&mut self, travel: f64) {
-        match self.reaction {
-            Reaction::Fade => {
-                self.gain_share = (self.gain_share - travel / self.settings.fade_travel).max(0.0);
-            }
-            Reaction::PassThrough => self.gain_share = 0.0,
+        let lead = &mut self.now.lead;
+        match self.now.reaction {
+            Reaction::Fade => *lead = (*lead - travel / self.settings.fade_travel).max(0.0),
+            Reaction::PassThrough => *lead = 0.0,
             Reaction::None | Reaction::Warn => {
-                self.gain_share =
-                    (self.gain_share + travel / self.settings.restore_travel).min(1.0);
+                *lead = (*lead + travel / self.settings.restore_travel).min(1.0);
             }
             Reaction::HoldEstimate
             | Reaction::HoldMotion
@@ -142,12 +152,13 @@ impl<const N: usize> Supervisor<N> {
     // Unrolled over the table wherever it is called, it would take minutes to compile.
     #[inline(never)]
     fn summarize(&mut self) {
-        (self.reaction, self.flags) = (Reaction::None, Flags::NONE);
+        let now = &mut self.now;
+        (now.reaction, now.flags) = (Reaction::None, Flags::NONE);
         for (rule, active) in TABLE.iter().zip(&self.active) {
             if let Some(active) = active {
-                self.flags = self.flags.union(Flags::of(rule.flag));
+                now.flags = now.flags.union(Flags::of(rule.flag));
                 if let Some((reaction, _)) = rule.levels.get(active.level) {
-                    self.reaction = self.reaction.max(*reaction);
+                    now.reaction = now.reaction.max(*reaction);
                 }
             }
         }
@@ -155,27 +166,12 @@ impl<const N: usize> Supervisor<N> {
 
     /// The operator acknowledges the warnings.
     pub const fn acknowledge(&mut self) {
-        self.latched = Flags::NONE;
+        self.now.latched = Flags::NONE;
     }
 
-    /// The highest reaction of all active flags.
-    pub const fn reaction(&self) -> Reaction {
-        self.reaction
-    }
-
-    /// The active flags.
-    pub const fn flags(&self) -> Flags {
-        self.flags
-    }
-
-    /// The flags raised or escalated since the last acknowledgement.
-    pub const fn latched(&self) -> Flags {
-        self.latched
-    }
-
-    /// Share of the free gain in use, 0 to 1.
-    pub const fn gain_share(&self) -> f64 {
-        self.gain_share
+    /// The state now.
+    pub const fn now(&self) -> Supervision {
+        self.now
     }
 }
 

@@ -83,7 +83,7 @@ proptest! {
         let (determinant, trace) = (a * d - b * c, a + d);
         prop_assume!(determinant.abs() > 1e-3 && determinant < 1e3 && trace.abs() > 1e-3);
         let found = camera(distortion).project(point).unwrap();
-        prop_assert_eq!(found.is_folded(), determinant < 0.0 || trace < 0.0);
+        prop_assert_eq!(found.is_folded, determinant < 0.0 || trace < 0.0);
     }
 
     /// A unit quaternion (w, u) rotates v to v + 2 w (u x v) + 2 u x (u x v).
@@ -124,7 +124,7 @@ fn the_edge_of_a_fold_belongs_to_it() {
     distortion[2] = -1.5;
     let found = camera(distortion).project([0.0, 1.0, 1.0]).unwrap();
     assert_eq!(found.pixel_by_point[0][0], 0.0);
-    assert!(found.pixel_by_point[1][1] > 0.0 && found.is_folded());
+    assert!(found.pixel_by_point[1][1] > 0.0 && found.is_folded);
 }
 
 /// With k4 = -10 the denominator is negative at a radius of 1/2: the image is turned by half a turn.
@@ -137,7 +137,7 @@ fn an_image_turned_by_half_a_turn_is_folded() {
     let found = camera(distortion).project([x, y, 1.0]).unwrap();
     let [by_u, by_v] = found.pixel_by_point;
     let (u, v) = (by_u[0] / FOCAL[0], by_v[1] / FOCAL[1]);
-    assert!(found.is_folded(), "{u} {v}");
+    assert!(found.is_folded, "{u} {v}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Motion that is discarded at a limit: reference and tip differ by no more than the reference went beyond it.
 
 use crate::article::play::Play;
+use crate::r#loop::any_loop::Loop as _;
 use crate::r#loop::paper::Paper;
 use crate::supervision::flags::Flag;
 

@@ -57,7 +57,7 @@ impl Direct {
         let own = settings(&safety()).estimation;
         let estimate = Estimate::new(own, transmission, [], &[Slack::default()], [UNIT]);
         let mut estimate = estimate.unwrap();
-        estimate.start([ORIGIN]);
+        estimate.origin = [ORIGIN];
         Self {
             estimate,
             plays: Plays::REST,
@@ -66,7 +66,7 @@ impl Direct {
 
     fn step(&mut self, command: f64) -> f64 {
         let to = [(command - ORIGIN) / UNIT];
-        self.plays = self.estimate.transmission().advance(&self.plays, &to);
+        self.plays = self.estimate.transmission.advance(&self.plays, &to);
         self.estimate.tip(&self.plays)[0]
     }
 
@@ -243,7 +243,7 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
         offsets: [PlayLimit::new(3.0 * UNIT, 2.0 * UNIT).unwrap()],
     };
     let own = settings(&safety()).law;
-    let mut law = VectorLaw::new(own, *direct.estimate.transmission(), &bounds).unwrap();
+    let mut law = VectorLaw::new(own, direct.estimate.transmission, &bounds).unwrap();
     let (mut errors, tenth) = ([0.0; 10], ticks() / 10);
     for tick in 0..ticks() {
         let to = ORIGIN + UNIT * reference(tick);

@@ -2,6 +2,7 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
+use crate::r#loop::any_loop::{BandLoop as _, Loop as _};
 use crate::r#loop::profile::BandProfile;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;

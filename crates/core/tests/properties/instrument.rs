@@ -90,5 +90,5 @@ fn bad_lengths_are_named() {
     assert_eq!(field(1.0, 0.0, 0.0, -1.0, 0.0), "radius");
     assert_eq!(field(1.0, 0.0, 0.0, 0.0, f64::NAN), "band_length");
     let sizes = Instrument::new(1.0, 0.0, 0.0, 2.0, 3.0).unwrap();
-    assert_eq!((sizes.radius(), sizes.band_length()), (2.0, 3.0));
+    assert_eq!((sizes.radius, sizes.band_length), (2.0, 3.0));
 }

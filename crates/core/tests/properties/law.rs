@@ -111,9 +111,9 @@ impl<const N: usize> Checked<N> {
 
     /// A tick in which `part` of the command's motion is sent.
     fn step(&mut self, reference: [f64; N], part: f64) {
-        let (before, tip) = (self.law.command(), self.tip(self.law.plays()));
+        let (before, tip) = (self.law.command, self.tip(&self.law.plays));
         let proposed = self.law.propose(reference, &self.rows, 1.0);
-        assert_eq!(self.law.command(), before, "a proposal moves nothing");
+        assert_eq!(self.law.command, before, "a proposal moves nothing");
         if !reference.iter().all(|value| value.is_finite()) {
             assert_eq!(proposed, before);
             return;
@@ -125,7 +125,7 @@ impl<const N: usize> Checked<N> {
             proposed
         };
         self.law.commit(sent);
-        assert_eq!(self.law.command(), sent);
+        assert_eq!(self.law.command, sent);
         for group in 0..N {
             self.check_group(group, last, before, proposed);
             if part >= 1.0 && self.share >= 1.0 {
@@ -199,7 +199,7 @@ impl<const N: usize> Checked<N> {
     /// |dq| <= `tip_gain` |du|, and q does not pass u.
     fn check_tip(&mut self, group: usize, last: [f64; N], before: [f64; N]) {
         let members = self.transmission.friction().members(group);
-        let after = self.tip(self.law.plays());
+        let after = self.tip(&self.law.plays);
         let minus = |a: [f64; N], b: [f64; N]| core::array::from_fn(|dof| a[dof] - b[dof]);
         let (dq, du) = (minus(after, before), minus(self.reference, last));
         let moved = self.dot(members, du, du).sqrt();
@@ -221,12 +221,12 @@ fn walk<const N: usize>(group: [usize; N], gain: [f64; N], seed: u64) {
     let unit = checked.transmission.unit();
     let mut speed = [0.0; N];
     for _ in 0..1000 {
-        let command = checked.law.command();
+        let command = checked.law.command;
         match random.below(100) {
             0 | 1 => checked.change_estimate(&mut random),
             2 => {
                 checked.share = [0.0, 1.0, 0.3][usize::try_from(random.below(3)).unwrap()];
-                checked.law.set_share(checked.share);
+                checked.law.share = checked.share;
             }
             3 => {
                 let shift = unit.map(|unit| unit * random.within(-0.2, 0.2));
@@ -272,8 +272,7 @@ fn walk<const N: usize>(group: [usize; N], gain: [f64; N], seed: u64) {
             }
         }
         assert_eq!(
-            checked.law.command(),
-            command,
+            checked.law.command, command,
             "only the reference moves a command"
         );
     }
@@ -352,7 +351,7 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
     for (offset, ratio) in [(0.5, 1.0), (0.0, 2.0)] {
         rows[0][OFFSET] = offset;
         let rate = 1.003 * own.change_rate / (ratio * ratio);
-        let (start, mut ticks) = (law.command()[0] - reference, 0);
+        let (start, mut ticks) = (law.command[0] - reference, 0);
         loop {
             reference += travel;
             let lead = step(&mut law, &rows, reference, ratio);

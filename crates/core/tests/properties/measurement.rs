@@ -166,7 +166,7 @@ proptest! {
             kalman.update(&row, &cross, &SVector::from([value]), 1.0, None);
         }
         let (mean, covariance, _) = problem.posterior(seen);
-        prop_assert!((problem.mean + root * kalman.mean() - mean).amax() <= 1e-6);
+        prop_assert!((problem.mean + root * kalman.mean - mean).amax() <= 1e-6);
         let spread = Joint::from_fn(|a, b| kalman.covariance(a, b));
         prop_assert!((root * spread * root.transpose() - covariance).amax() <= 1e-6);
     }

@@ -13,6 +13,8 @@ mod estimator;
 mod expectation;
 mod fading;
 mod features;
+mod flags;
+mod frame_rate;
 mod frames;
 mod guarantees;
 mod history;
@@ -35,6 +37,7 @@ mod prediction_monitor;
 mod recovery;
 mod reference_gate;
 mod reference_speed;
+mod section;
 mod slide;
 mod state;
 mod stress;
@@ -43,6 +46,7 @@ mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod turning_points;
 mod whole;
 
 use crate::article::play::Play;

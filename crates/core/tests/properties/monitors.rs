@@ -2,6 +2,7 @@
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
+use crate::r#loop::any_loop::Loop as _;
 use crate::r#loop::paper::Paper;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;

@@ -52,16 +52,24 @@ fn commands<const N: usize>(points: &[[f64; N]], step: f64) -> Vec<[f64; N]> {
     all
 }
 
+/// Radii of the plays of each DOF, in the order of the regressors.
+fn all_radii<const N: usize>(transmission: &Transmission<N>) -> [Vec<f64>; N] {
+    transmission
+        .dofs()
+        .each_ref()
+        .map(|dof| dof.all().collect())
+}
+
 /// Outputs of the plays of a DOF that are of its friction group, and of those by itself.
 fn outputs<const N: usize>(plays: &Plays<N>) -> [Vec<f64>; N] {
     let radii = Transmission::<1>::new(Friction::independent(), [1.0]);
-    let count = radii.unwrap().radii()[0].len();
+    let count = all_radii(&radii.unwrap())[0].len();
     plays.regressors().map(|row| row[..count].to_vec())
 }
 
 /// Largest sum of (e / h)^2 over the groups and their vector plays.
 fn fullest<const N: usize>(transmission: &Transmission<N>, plays: &Plays<N>) -> f64 {
-    let (radii, outputs) = (transmission.radii(), outputs(plays));
+    let (radii, outputs) = (all_radii(transmission), outputs(plays));
     let mut most = 0.0_f64;
     for group in 0..N {
         let members = transmission.friction().members(group);
@@ -81,9 +89,9 @@ fn check_scalar<const N: usize>(
     points: &[[f64; N]],
 ) -> Result<(), TestCaseError> {
     let (mut plays, mut states) = (Plays::REST, vec![]);
-    let radii = transmission.radii();
+    let radii = all_radii(transmission);
     for (dof, radii) in radii.iter().enumerate() {
-        let first = if transmission.is_alone()[dof] {
+        let first = if transmission.dofs()[dof].is_alone {
             0
         } else {
             SHARED
@@ -139,8 +147,11 @@ fn check_one_moves<const N: usize>(
     dof: usize,
     points: &[[f64; 1]],
 ) -> Result<(), TestCaseError> {
-    let radii = transmission.radii();
-    let mut states = radii[dof].map(|radius| (Play::new(-radius, radius), 0.0));
+    let radii = all_radii(transmission);
+    let mut states: Vec<_> = radii[dof]
+        .iter()
+        .map(|radius| (Play::new(-radius, *radius), 0.0))
+        .collect();
     let mut plays = Plays::REST;
     for [to] in commands(points, TICK) {
         let mut command = [0.0; N];
@@ -163,7 +174,7 @@ fn check_one_moves<const N: usize>(
 fn apart<const N: usize>(transmission: &Transmission<N>, a: &Plays<N>, b: &Plays<N>) -> f64 {
     let (a, b) = (outputs(a), outputs(b));
     let mut most = 0.0_f64;
-    for (dof, radii) in transmission.radii().iter().enumerate() {
+    for (dof, radii) in all_radii(transmission).iter().enumerate() {
         for (index, radius) in radii.iter().enumerate().take(SHARED) {
             most = most.max((a[dof][index] - b[dof][index]).abs() / radius);
         }
@@ -225,7 +236,7 @@ proptest! {
         for part in 1..=32 {
             divided = transmission.advance(&divided, &to(f64::from(part) / 32.0));
         }
-        let radii = transmission.radii();
+        let radii = all_radii(&transmission);
         let narrowest = radii.iter().flat_map(|radii| &radii[..SHARED]);
         let narrowest = narrowest.copied().fold(f64::INFINITY, f64::min);
         let order = size / narrowest;
@@ -239,7 +250,7 @@ proptest! {
         points in path::<2>(8), lever in sizes::<2>(), unit in sizes::<2>(),
     ) {
         let transmission = transmission([0, 0], lever, unit);
-        let radii = transmission.radii();
+        let radii = all_radii(&transmission);
         let step = 0.01;
         let (mut plays, mut exact) = (Plays::REST, [[0.0; 2]; SHARED]);
         for command in commands(&points, step) {

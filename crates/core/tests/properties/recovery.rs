@@ -2,6 +2,7 @@
 //! for ever.
 
 use crate::dof::PerDof;
+use crate::r#loop::any_loop::{BandLoop as _, Loop as _};
 use crate::r#loop::profile::BandProfile;
 use crate::r#loop::report::Status;
 use crate::supervision::reactions::Reaction;

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::article::play::Play;
+use crate::r#loop::any_loop::Loop as _;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;

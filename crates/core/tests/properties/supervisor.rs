@@ -113,9 +113,9 @@ fn every_level_is_reached_and_cleared_as_the_table_says() {
                 });
                 now += 4.0;
             }
-            assert_eq!(supervisor.reaction(), *reaction, "{rule:?}");
-            assert_eq!(supervisor.latched(), flag);
-            assert_eq!(supervisor.flags(), flag);
+            assert_eq!(supervisor.now().reaction, *reaction, "{rule:?}");
+            assert_eq!(supervisor.now().latched, flag);
+            assert_eq!(supervisor.now().flags, flag);
             let good = |supervisor: &mut Supervisor<3>, count: u32| {
                 for _ in 0..count {
                     supervisor.update(&event(rule.source, now, 0.0, Flags::NONE));
@@ -126,30 +126,30 @@ fn every_level_is_reached_and_cleared_as_the_table_says() {
                     let needed = if rule.source == Source::Frame { 5 } else { 200 };
                     supervisor.engage();
                     good(&mut supervisor, needed - 1);
-                    assert_eq!(supervisor.reaction(), *reaction, "{rule:?}");
+                    assert_eq!(supervisor.now().reaction, *reaction, "{rule:?}");
                     good(&mut supervisor, 1);
                 }
                 Clear::Engage => {
                     good(&mut supervisor, 1000);
-                    assert_eq!(supervisor.reaction(), *reaction, "{rule:?}");
+                    assert_eq!(supervisor.now().reaction, *reaction, "{rule:?}");
                     supervisor.engage();
                 }
                 Clear::Restart => {
                     good(&mut supervisor, 1000);
                     supervisor.engage();
                     supervisor.acknowledge();
-                    assert_eq!(supervisor.reaction(), *reaction, "{rule:?}");
+                    assert_eq!(supervisor.now().reaction, *reaction, "{rule:?}");
                     continue;
                 }
             }
-            assert_eq!(supervisor.reaction(), Reaction::None, "{rule:?}");
+            assert_eq!(supervisor.now().reaction, Reaction::None, "{rule:?}");
             assert_eq!(
-                supervisor.latched(),
+                supervisor.now().latched,
                 flag,
                 "a warning stays until it is acknowledged"
             );
             supervisor.acknowledge();
-            assert!(supervisor.latched().is_empty());
+            assert!(supervisor.now().latched.is_empty());
         }
     }
 }
@@ -161,39 +161,39 @@ fn a_hold_ends_by_time_or_travel_and_compensation_returns_with_motion_once_the_c
     by_travel.update(&event(Source::Frame, 0.0, 0.0, frozen));
     by_travel.update(&event(Source::Tick, 0.1, 3.9, Flags::NONE));
     by_travel.update(&event(Source::Frame, 0.1, 0.0, frozen));
-    assert_eq!(by_travel.reaction(), Reaction::HoldEstimate);
+    assert_eq!(by_travel.now().reaction, Reaction::HoldEstimate);
     by_travel.update(&event(Source::Tick, 0.2, 0.2, Flags::NONE));
     by_travel.update(&event(Source::Frame, 0.2, 0.0, frozen));
-    assert_eq!(by_travel.reaction(), Reaction::Fade);
+    assert_eq!(by_travel.now().reaction, Reaction::Fade);
 
     let mut supervisor = supervisor();
     supervisor.update(&event(Source::Frame, 0.0, 0.0, frozen));
     supervisor.update(&event(Source::Frame, 4.0, 0.0, frozen));
-    assert_eq!(supervisor.reaction(), Reaction::Fade);
+    assert_eq!(supervisor.now().reaction, Reaction::Fade);
     // Time alone changes nothing.
     supervisor.update(&event(Source::Tick, 1000.0, 0.0, Flags::NONE));
-    assert!((supervisor.gain_share() - 1.0).abs() < 1e-12);
+    assert!((supervisor.now().lead - 1.0).abs() < 1e-12);
     supervisor.update(&event(Source::Tick, 1000.0, 0.5, Flags::NONE));
-    assert!((supervisor.gain_share() - 0.75).abs() < 1e-12);
+    assert!((supervisor.now().lead - 0.75).abs() < 1e-12);
     for _ in 0..5 {
         supervisor.update(&event(Source::Frame, 1000.0, 0.0, Flags::NONE));
     }
-    assert_eq!(supervisor.reaction(), Reaction::None);
+    assert_eq!(supervisor.now().reaction, Reaction::None);
     supervisor.update(&event(Source::Tick, 1001.0, 0.0, Flags::NONE));
-    assert!((supervisor.gain_share() - 0.75).abs() < 1e-12);
+    assert!((supervisor.now().lead - 0.75).abs() < 1e-12);
     supervisor.update(&event(Source::Tick, 1001.0, 0.3, Flags::NONE));
-    assert!((supervisor.gain_share() - 0.9).abs() < 1e-12);
-    assert_eq!(supervisor.latched(), frozen, "the warning stays");
+    assert!((supervisor.now().lead - 0.9).abs() < 1e-12);
+    assert_eq!(supervisor.now().latched, frozen, "the warning stays");
     // While the estimate is held again, the share stays.
     supervisor.update(&event(Source::Frame, 1001.0, 0.0, frozen));
     supervisor.update(&event(Source::Tick, 1002.0, 1.0, Flags::NONE));
-    assert_eq!(supervisor.reaction(), Reaction::HoldEstimate);
-    assert!((supervisor.gain_share() - 0.9).abs() < 1e-12);
+    assert_eq!(supervisor.now().reaction, Reaction::HoldEstimate);
+    assert!((supervisor.now().lead - 0.9).abs() < 1e-12);
     for _ in 0..5 {
         supervisor.update(&event(Source::Frame, 1002.0, 0.0, Flags::NONE));
     }
     supervisor.update(&event(Source::Tick, 1001.0, 9.0, Flags::NONE));
-    assert!((supervisor.gain_share() - 1.0).abs() < 1e-12);
+    assert!((supervisor.now().lead - 1.0).abs() < 1e-12);
 }
 
 /// A hold is over when its time or its travel is reached.
@@ -210,7 +210,7 @@ fn a_hold_ends_on_its_bound() {
         let mut supervisor = supervisor();
         supervisor.update(&event(Source::Frame, 0.0, 0.0, frozen));
         supervisor.update(&event(Source::Frame, time, travel, frozen));
-        assert_eq!(supervisor.reaction(), expected, "{time} s, {travel}");
+        assert_eq!(supervisor.now().reaction, expected, "{time} s, {travel}");
     }
 }
 
@@ -239,14 +239,14 @@ proptest! {
     fn any_events_keep_the_gain_share_from_0_to_1_and_change_it_with_motion_only(actions in actions()) {
         let (mut supervisor, mut now) = (supervisor(), 0.0);
         for action in actions {
-            let before = supervisor.gain_share();
+            let before = supervisor.now().lead;
             apply(&mut supervisor, &mut now, &action, Flags::NONE);
-            let share = supervisor.gain_share();
+            let share = supervisor.now().lead;
             prop_assert!((0.0..=1.0).contains(&share));
-            let passes = supervisor.reaction() == Reaction::PassThrough;
+            let passes = supervisor.now().reaction == Reaction::PassThrough;
             let still = !matches!(action, Action::Update(_, _, travel, _, _) if travel > 0.0);
             prop_assert!(passes || !still || (share - before).abs() == 0.0);
-            prop_assert!(!supervisor.flags().is_empty() || supervisor.reaction() == Reaction::None);
+            prop_assert!(!supervisor.now().flags.is_empty() || supervisor.now().reaction == Reaction::None);
         }
     }
 
@@ -263,15 +263,15 @@ proptest! {
             let raised = Flags::when(is_present, flag);
             for _ in 0..frames {
                 now += 0.04;
-                let before = supervisor.gain_share();
+                let before = supervisor.now().lead;
                 supervisor.update(&event(Source::Frame, now, 0.0, raised));
-                prop_assert_eq!(supervisor.gain_share(), before, "a frame moves nothing");
+                prop_assert_eq!(supervisor.now().lead, before, "a frame moves nothing");
                 let moved = travel / f64::from(frames);
                 supervisor.update(&event(Source::Tick, now, moved, Flags::NONE));
-                let change = supervisor.gain_share() - before;
+                let change = supervisor.now().lead - before;
                 prop_assert!(change.abs() <= moved / least + 1e-12);
-                prop_assert!((0.0..=1.0).contains(&supervisor.gain_share()));
-                match supervisor.reaction() {
+                prop_assert!((0.0..=1.0).contains(&supervisor.now().lead));
+                match supervisor.now().reaction {
                     Reaction::Fade => prop_assert!(change <= 0.0),
                     Reaction::None | Reaction::Warn => prop_assert!(change >= 0.0),
                     _ => prop_assert_eq!(change, 0.0),
@@ -283,7 +283,7 @@ proptest! {
             supervisor.update(&event(Source::Frame, now, 0.0, Flags::NONE));
         }
         supervisor.update(&event(Source::Tick, now, settings.restore_travel, Flags::NONE));
-        prop_assert_eq!(supervisor.gain_share(), 1.0);
+        prop_assert_eq!(supervisor.now().lead, 1.0);
     }
 
     /// With one more flag raised at every event, the reaction is never weaker.
@@ -298,7 +298,7 @@ proptest! {
             apply(&mut without, &mut again, &action, Flags::NONE);
             // Re-engaging clears a flag that stops motion, and not a weaker one.
             if matches!(action, Action::Update(..)) {
-                prop_assert!(with.reaction() >= without.reaction());
+                prop_assert!(with.now().reaction >= without.now().reaction);
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::article::compensator::{Compensator, CompensatorState};
 use crate::article::play::Play;
+use crate::r#loop::any_loop::Loop as _;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;
 use crate::supervision::settings::SafetySettings;

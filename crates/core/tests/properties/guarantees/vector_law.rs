@@ -47,7 +47,7 @@ impl CheckedLaw {
             start,
         )
         .unwrap();
-        estimate.start([0.0; 3]);
+        estimate.origin = [0.0; 3];
         Self {
             law: VectorLaw::new(settings.law, transmission, &bounds).unwrap(),
             estimate,
@@ -59,7 +59,7 @@ impl CheckedLaw {
 
     /// A tick whose command is cut to a part of its motion.
     fn step(&mut self, reference: PerDof<f64>, part: f64) {
-        let before = self.law.command();
+        let before = self.law.command;
         let mut command = self.propose(reference);
         if part < 1.0 {
             for (command, before) in command.iter_mut().zip(before) {
@@ -76,7 +76,7 @@ impl CheckedLaw {
         }
         let dof = usize::try_from(random.below(3)).unwrap();
         let std = UNITS[dof] * random.within(0.1, 3.0);
-        let tip = self.law.command()[dof] + UNITS[dof] * random.within(-30.0, 30.0);
+        let tip = self.law.command[dof] + UNITS[dof] * random.within(-30.0, 30.0);
         let mut by_state = SMatrix::<f64, 1, 3>::zeros();
         by_state[dof] = 1.0 / std;
         let measurement = Linear {
@@ -84,7 +84,7 @@ impl CheckedLaw {
             by_geometry: SMatrix::zeros(),
             value: SVector::from([tip / std]),
         };
-        let plays = self.law.plays();
+        let plays = &self.law.plays;
         self.estimate.advance(plays.travel);
         self.estimate
             .update(plays, &measurement, 0.0, random.below(4) == 0);
@@ -95,7 +95,7 @@ impl CheckedLaw {
 
     /// Bounds of a tick: of the norm over insertion and rotation, of bending to the last bit, and of each speed.
     fn check(&mut self, reference: PerDof<f64>, before: PerDof<f64>) {
-        let (after, last) = (self.law.command(), self.reference);
+        let (after, last) = (self.law.command, self.reference);
         if !reference
             .iter()
             .chain(&before)
@@ -142,7 +142,7 @@ impl CheckedLaw {
 
 impl Law<3> for CheckedLaw {
     fn command(&self) -> PerDof<f64> {
-        self.law.command()
+        self.law.command
     }
 
     fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
@@ -152,7 +152,7 @@ impl Law<3> for CheckedLaw {
     }
 
     fn commit(&mut self, command: PerDof<f64>) {
-        let before = self.law.command();
+        let before = self.law.command;
         self.law.commit(command);
         self.check(self.next, before);
         if self.next.iter().all(|value| value.is_finite()) {
@@ -161,18 +161,18 @@ impl Law<3> for CheckedLaw {
     }
 
     fn shift_reference(&mut self, shift: PerDof<f64>) {
-        let before = self.law.command();
+        let before = self.law.command;
         self.law.shift_reference(shift);
         for (reference, shift) in self.reference.iter_mut().zip(shift) {
             *reference += shift;
         }
-        self.rest(before, self.law.command(), &[0, 1, 2]);
+        self.rest(before, self.law.command, &[0, 1, 2]);
     }
 
     fn set_share(&mut self, share: f64) {
-        let before = self.law.command();
-        self.law.set_share(share);
-        self.rest(before, self.law.command(), &[0, 1, 2]);
+        let before = self.law.command;
+        self.law.share = share;
+        self.rest(before, self.law.command, &[0, 1, 2]);
     }
 }
 
@@ -286,7 +286,7 @@ fn supervised_walk(seed: u64, wanted: u64) -> Count {
         monitors.step(&mut checked, next, None, time, |_, command| command);
         reference = next;
         for (dof, limit) in safety().width_limit.into_iter().enumerate() {
-            let lead = (checked.law.command()[dof] - checked.reference[dof]).abs();
+            let lead = (checked.law.command[dof] - checked.reference[dof]).abs();
             // Motion that is discarded counts from where it was.
             let discarded = UNITS[dof] * 1.001;
             checked.count.gain += u64::from(lead > led[dof].max(limit) + discarded);
