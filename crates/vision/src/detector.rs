@@ -2,7 +2,7 @@
 
 use crate::blur::BlurFitter;
 use crate::error::Error;
-use crate::frame_search::{FrameSearch, Memory};
+use crate::frame_search::{Found, FrameSearch, Memory};
 use crate::recognition::{BandPredictor, BlobPostures, Outline, PostureTable, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
 use crate::settings::Settings;
@@ -37,17 +37,12 @@ impl Detector {
         for (weights, threshold) in alternatives.iter().chain(&settings.unlocated.alternatives) {
             discriminants.push(ColorDiscriminant::new(*weights, *threshold)?);
         }
-        let scanner = Scanner::new(&discriminants, smoothing, minimum_area);
-        let [best, first, kept] = [(); 3].map(|()| Vec::with_capacity(scanner.regions.capacity()));
         Ok(Self {
             unlocated: settings.unlocated(),
             settings,
             postures: PostureTable::default(),
             memory: Memory {
-                scanner,
-                best,
-                first,
-                kept,
+                scanner: Scanner::new(&discriminants, smoothing, minimum_area),
                 blobs: BlobPostures::default(),
                 blur: BlurFitter::default(),
             },
@@ -78,31 +73,34 @@ impl Detector {
         frame: &impl Frame,
         predictor: &impl BandPredictor,
     ) -> (Recognition, &[Region]) {
-        let mut found = self.search(frame, predictor).run();
-        if found.rejections == [None; 2] {
-            return (found, &self.memory.scanner.regions);
+        let found = self.find(frame, predictor);
+        self.memory.scanner.regions = found.regions;
+        (found.bands, self.memory.scanner.regions.as_slice())
+    }
+
+    fn find(&mut self, frame: &impl Frame, predictor: &impl BandPredictor) -> Found {
+        let found = self.search(frame, predictor).run();
+        if found.is_complete() {
+            return found;
         }
+        let is_located = predictor.is_located();
         if let Some(relaxed) = predictor.relaxed() {
-            self.memory.swap_kept();
-            let near = predictor
-                .is_located()
-                .then(|| self.search(frame, &relaxed).run())
-                .filter(|near| near.rejections == [None; 2]);
+            let near = is_located.then(|| self.search(frame, &relaxed).run());
             let again = near
+                .filter(Found::is_complete)
                 .or_else(|| {
                     let relaxed = relaxed.relaxed().filter(BandPredictor::is_located)?;
                     self.search(frame, &relaxed).run_clear()
                 })
                 .or_else(|| self.search(frame, &relaxed.anywhere()?).run_clear());
             if let Some(again) = again {
-                return (again, &self.memory.scanner.regions);
+                return again;
             }
-            self.memory.swap_kept();
         }
-        if predictor.is_located() && found.rejections.iter().all(Option::is_some) {
-            found = self.search(frame, predictor).run_whole(&found);
+        if is_located && found.bands.rejections.iter().all(Option::is_some) {
+            return self.search(frame, predictor).run_whole(&found);
         }
-        (found, &self.memory.scanner.regions)
+        found
     }
 
     fn search<'a, F: Frame, P: BandPredictor>(
@@ -131,6 +129,6 @@ impl Detector {
     pub fn regions_in(&mut self, frame: &impl Frame, windows: &[Window]) -> &[Region] {
         let scanner = &mut self.memory.scanner;
         scanner.find_regions(frame, windows);
-        &scanner.regions
+        scanner.regions.as_slice()
     }
 }

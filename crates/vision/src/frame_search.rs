@@ -3,9 +3,9 @@
 use crate::blur::{BlurFit, BlurFitter};
 use crate::recognition::{
     BLOBS, BandPrediction, BandPredictor, BlobPostures, LEAST_CONTRAST, OutlineSearch,
-    PostureTable, Recognition, SECTION_DISCS, SectionDisc, section_contrast,
+    PostureTable, Recognition, section_contrast,
 };
-use crate::scan::{Frame, Region, Scanner, Window};
+use crate::scan::{Frame, Regions, Scanner, Window};
 use crate::settings::Settings;
 
 /// Least sum of the edge shares of both bands for which the outlines are fitted again near them, without a prediction.
@@ -24,22 +24,33 @@ const SECTION_STD: [f64; 4] = [0.5; 4];
 pub struct Memory {
     /// Regions and runs of the last scan.
     pub scanner: Scanner,
-    /// Regions of the best result of the discriminants so far.
-    pub best: Vec<Region>,
-    /// Regions of the result in the whole frame.
-    pub first: Vec<Region>,
-    /// Regions of the result near the prediction.
-    pub kept: Vec<Region>,
     /// Postures of bands that are one region of some discriminant.
     pub blobs: BlobPostures,
     /// Fit of the intensity.
     pub blur: BlurFitter,
 }
 
-impl Memory {
-    /// Exchanges the regions of the last search and those that are kept.
-    pub const fn swap_kept(&mut self) {
-        std::mem::swap(&mut self.kept, &mut self.scanner.regions);
+/// A result, and the regions that it is based on.
+#[derive(Clone, Copy)]
+pub struct Found {
+    /// The bands.
+    pub bands: Recognition,
+    /// The regions.
+    pub regions: Regions,
+}
+
+impl Found {
+    /// Whether both bands are recognised.
+    pub fn is_complete(&self) -> bool {
+        self.bands.rejections == [None; 2]
+    }
+
+    fn or_better(self, other: Self, settings: &Settings) -> Self {
+        if other.bands.is_better(&self.bands, settings) {
+            other
+        } else {
+            self
+        }
     }
 }
 
@@ -59,25 +70,33 @@ pub struct FrameSearch<'a, F, P> {
 
 impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     /// Recognises both bands in the whole frame if the trained discriminant shows them clearly.
-    pub fn run_clear(mut self) -> Option<Recognition> {
+    pub fn run_clear(mut self) -> Option<Found> {
         self.memory.blobs = [None; BLOBS];
         let found = self.by_discriminant(Window::whole(self.frame), 0);
-        let is_clear = found.rejections == [None; 2]
-            && found
-                .scores
-                .iter()
+        let is_clear = found.is_complete()
+            && (found.bands.scores.iter())
                 .all(|score| score.coverage >= CLEAR_COVERAGE && score.inside >= CLEAR_INSIDE);
         is_clear.then_some(found)
     }
 
-    /// Recognises the bands.
-    pub fn run(mut self) -> Recognition {
+    /// Recognises the bands: in the window around the prediction, or without one in the whole frame, and again near what was
+    /// found there.
+    pub fn run(mut self) -> Found {
+        let whole = Window::whole(self.frame);
         if self.predictor.is_located() {
-            return self.near_prediction();
+            let near = self.window();
+            let found = self.by_edges(near.map_or(whole, |(_, window)| window));
+            return match near {
+                // Intensity is less reliable than edges: it is used only near a known position.
+                Some((prior, window)) if !found.bands.is_clear(self.settings) => {
+                    self.by_intensity(window, &[found.bands.centroids(), prior.features], &found)
+                }
+                _ => found,
+            };
         }
         self.memory.blobs = [None; BLOBS];
-        let found = self.by_edges(Window::whole(self.frame));
-        if found.is_clear(self.settings) {
+        let found = self.by_edges(whole);
+        if found.bands.is_clear(self.settings) {
             found
         } else {
             self.again(&found)
@@ -85,74 +104,59 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     }
 
     /// The better of the result in the window around the prediction and that by the edges in the whole frame.
-    pub fn run_whole(mut self, found: &Recognition) -> Recognition {
-        if self.window().is_some() {
-            self.memory.swap_kept();
-            let anywhere = self.by_edges(Window::whole(self.frame));
-            if self.is_better(&anywhere, found) {
-                return anywhere;
-            }
-            self.memory.swap_kept();
+    pub fn run_whole(mut self, found: &Found) -> Found {
+        if self.window().is_none() {
+            return *found;
         }
-        *found
+        let anywhere = self.by_edges(Window::whole(self.frame));
+        found.or_better(anywhere, self.settings)
     }
 
     /// The best of a result without a prediction that is not clear, of a search for edges near it, and of the intensity fit
     /// from the likeliest of the postures that the regions allow.
-    fn again(&mut self, found: &Recognition) -> Recognition {
+    fn again(&mut self, found: &Found) -> Found {
         let mut best = *found;
-        let start = found.centroids();
-        if found.scores[0].edges + found.scores[1].edges > LEAST_EDGES
-            && let Some((predictor, window)) = self.near(start)
+        let start = found.bands.centroids();
+        let [a, b] = &found.bands.scores;
+        if a.edges + b.edges > LEAST_EDGES
+            && let Some((predictor, _, window)) = self.near(start)
         {
-            self.swap_first();
             let near = self.with(&predictor).by_edges(window);
-            if self.is_better(&near, found) {
-                best = near;
-            } else {
-                self.swap_first();
-            }
-            if best.is_clear(self.settings) {
+            best = found.or_better(near, self.settings);
+            if best.bands.is_clear(self.settings) {
                 return best;
             }
         }
-        let likeliest = if best.rejections == [None; 2] {
-            Some(best.features)
+        let likeliest = if best.is_complete() {
+            Some(best.bands.features)
         } else {
             self.likeliest_blurred(start)
         };
-        let Some((predictor, window)) = likeliest.and_then(|start| self.near(start)) else {
-            return best;
-        };
-        let mut search = self.with(&predictor);
-        match predictor
-            .predict([0.0; 4], [f64::INFINITY; 4])
-            .and_then(|prior| search.by_intensity([prior.features; 2]))
-        {
-            Some(fit) => search.best_of(window, &best, &fit),
+        match likeliest.and_then(|start| self.near(start)) {
+            Some((predictor, prior, window)) => {
+                let mut search = self.with(&predictor);
+                search.by_intensity(window, &[prior.features], &best)
+            }
             None => best,
         }
     }
 
-    /// The predictor with the posture at features `start` as prior, and the window around its bands.
-    fn near(&self, start: [f64; 4]) -> Option<(P, Window)> {
+    /// The predictor with the posture at features `start` as prior, its prediction, and the window around it.
+    fn near(&mut self, start: [f64; 4]) -> Option<(P, BandPrediction, Window)> {
         if !start.iter().all(|value| value.is_finite()) {
             return None;
         }
         let predictor = self.predictor.near(start)?;
-        let prior = predictor.predict([0.0; 4], [f64::INFINITY; 4])?;
-        let window = prior.window(self.frame, self.settings.search_margin)?;
-        Some((predictor, window))
+        let (prior, window) = self.with(&predictor).window()?;
+        Some((predictor, prior, window))
     }
 
     /// This search with another predictor.
     fn with<'b>(&'b mut self, predictor: &'b P) -> FrameSearch<'b, F, P> {
         FrameSearch {
-            frame: self.frame,
             predictor,
-            settings: self.settings,
-            postures: self.postures,
             memory: &mut *self.memory,
+            ..*self
         }
     }
 
@@ -160,22 +164,20 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     /// one region.
     fn likeliest_blurred(&mut self, start: [f64; 4]) -> Option<[f64; 4]> {
         let mut best: Option<(f64, [f64; 4])> = None;
-        let blobs = self.memory.blobs;
-        let blobs = blobs.iter().flatten().map(|(_, features)| *features);
+        let blobs = self.memory.blobs.into_iter().flatten();
+        let blobs = blobs.map(|(_, features)| features);
         for start in std::iter::once(start).chain(blobs) {
-            let Some((predictor, _)) = self.near(start) else {
+            let Some((predictor, ..)) = self.near(start) else {
                 continue;
             };
-            let section = predictor.section(start, SECTION_STD);
-            if self.contrast(&section) < 0.5 * LEAST_CONTRAST {
+            let mut search = self.with(&predictor);
+            if search.contrast(start) < 0.5 * LEAST_CONTRAST {
                 continue;
             }
-            let blur = &mut self.memory.blur;
-            let Some(fit) = blur.fit(self.frame, &predictor, start, true, self.settings) else {
+            let Some(fit) = search.fit_intensity(start, true) else {
                 continue;
             };
-            let section = predictor.section(fit.features, SECTION_STD);
-            let score = fit.explained + self.contrast(&section);
+            let score = fit.explained + search.contrast(fit.features);
             if best.is_none_or(|(most, _)| score > most) {
                 best = Some((score, fit.features));
             }
@@ -190,100 +192,76 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         Some((prior, window))
     }
 
-    /// Searches in the window around the prediction.
-    fn near_prediction(&mut self) -> Recognition {
-        let near = self.window();
-        let whole = Window::whole(self.frame);
-        let found = self.by_edges(near.map_or(whole, |(_, window)| window));
-        if found.is_clear(self.settings) {
-            return found;
-        }
-        // Intensity is less reliable than edges: it is used only near a known position.
-        let Some((prior, window)) = near else {
-            return found;
-        };
-        match self.by_intensity([found.centroids(), prior.features]) {
-            Some(fit) => self.best_of(window, &found, &fit),
-            None => found,
-        }
-    }
-
-    fn is_better(&self, one: &Recognition, other: &Recognition) -> bool {
-        one.is_better(other, self.settings)
-    }
-
     /// The first certain result of the discriminants in turn, or the best.
-    fn by_edges(&mut self, window: Window) -> Recognition {
+    fn by_edges(&mut self, window: Window) -> Found {
         let mut found = self.by_discriminant(window, 0);
         for index in 1..=self.settings.alternatives.len() {
-            if found.is_certain(self.settings) {
+            if found.bands.is_certain(self.settings) {
                 break;
             }
-            self.swap_regions();
-            let other = self.by_discriminant(window, index);
-            if self.is_better(&other, &found) {
-                found = Recognition {
-                    discriminant: index,
-                    ..other
-                };
-            } else {
-                self.swap_regions();
-            }
+            found = found.or_better(self.by_discriminant(window, index), self.settings);
         }
         found
     }
 
-    fn by_discriminant(&mut self, window: Window, index: usize) -> Recognition {
-        self.memory.scanner.find(self.frame, window, index);
+    fn by_discriminant(&mut self, window: Window, discriminant: usize) -> Found {
+        self.memory.scanner.find(self.frame, window, discriminant);
+        let regions = self.memory.scanner.regions;
         let mut blobs = self.memory.blobs;
-        let found = self
-            .outlines()
-            .recognise(&self.memory.scanner.regions, &mut blobs);
+        let bands = self.outlines().recognise(regions.as_slice(), &mut blobs);
         self.memory.blobs = blobs;
-        found
+        Found {
+            bands: Recognition {
+                discriminant,
+                ..bands
+            },
+            regions,
+        }
     }
 
-    /// An accepted fit of the intensity, from the first of the positions that leads to one.
-    fn by_intensity(&mut self, starts: [[f64; 4]; 2]) -> Option<BlurFit> {
-        let Memory { scanner, blur, .. } = &mut *self.memory;
-        starts
-            .into_iter()
-            .filter(|start| start.iter().all(|value| value.is_finite()))
-            .filter_map(|start| blur.fit(self.frame, self.predictor, start, false, self.settings))
-            .find(|fit| {
-                fit.is_accepted(self.settings)
-                    && fit.is_inside(&scanner.map, self.settings)
-                    && (!self.settings.is_unlocated || {
-                        let section = self.predictor.section(fit.features, SECTION_STD);
-                        section_contrast(self.frame, &section).unwrap_or_default() > LEAST_CONTRAST
-                    })
-            })
-    }
-
-    /// The best of a result that is not clear, the edges near the intensity fit, and that fit itself.
-    fn best_of(&mut self, window: Window, found: &Recognition, fit: &BlurFit) -> Recognition {
-        self.swap_regions();
+    /// The best of a result that is not clear, the first accepted fit of the intensity from one of the positions, and the edges
+    /// near that.
+    fn by_intensity(&mut self, window: Window, starts: &[[f64; 4]], found: &Found) -> Found {
+        let finite = |start: &&[f64; 4]| start.iter().all(|value| value.is_finite());
+        let fit = starts.iter().filter(finite).find_map(|start| {
+            let fit = self.fit_intensity(*start, false)?;
+            self.is_accepted(&fit).then_some(fit)
+        });
+        let Some(fit) = fit else {
+            return *found;
+        };
         self.memory.scanner.find(self.frame, window, 0);
         // The fit is accepted with about this standard deviation (px).
         let near = self.outlines().recognise_at(fit.features, [1.0; 4]);
-        let edges = match near {
-            Some(near) if self.is_better(&near, found) => near,
-            _ => {
-                self.swap_regions();
-                *found
-            }
-        };
-        if edges.rejections != [None; 2]
-            || fit.is_blurred(&self.settings.blur) && !edges.is_clear(self.settings)
-        {
-            fit.recognition()
-        } else {
-            edges
+        let edges = near.map_or(*found, |bands| {
+            let regions = self.memory.scanner.regions;
+            found.or_better(Found { bands, regions }, self.settings)
+        });
+        let is_blurred = fit.is_blurred(&self.settings.blur);
+        if edges.is_complete() && (!is_blurred || edges.bands.is_clear(self.settings)) {
+            return edges;
+        }
+        Found {
+            bands: fit.recognition(),
+            ..edges
         }
     }
 
-    fn contrast(&self, section: &[Option<SectionDisc>; SECTION_DISCS]) -> f64 {
-        section_contrast(self.frame, section).unwrap_or_default()
+    fn fit_intensity(&mut self, start: [f64; 4], is_trial: bool) -> Option<BlurFit> {
+        let blur = &mut self.memory.blur;
+        blur.fit(self.frame, self.predictor, start, is_trial, self.settings)
+    }
+
+    fn is_accepted(&self, fit: &BlurFit) -> bool {
+        fit.is_accepted(self.settings)
+            && fit.is_inside(&self.memory.scanner.map, self.settings)
+            && (!self.settings.is_unlocated || self.contrast(fit.features) > LEAST_CONTRAST)
+    }
+
+    /// See [`section_contrast`], in the posture at these features (px).
+    fn contrast(&self, features: [f64; 4]) -> f64 {
+        let section = self.predictor.section(features, SECTION_STD);
+        section_contrast(self.frame, &section).unwrap_or_default()
     }
 
     fn outlines(&self) -> OutlineSearch<'_, F, P> {
@@ -294,15 +272,5 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
             settings: self.settings,
             postures: self.postures,
         }
-    }
-
-    fn swap_regions(&mut self) {
-        let Memory { scanner, best, .. } = &mut *self.memory;
-        std::mem::swap(best, &mut scanner.regions);
-    }
-
-    fn swap_first(&mut self) {
-        let Memory { scanner, first, .. } = &mut *self.memory;
-        std::mem::swap(first, &mut scanner.regions);
     }
 }

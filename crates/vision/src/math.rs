@@ -43,6 +43,11 @@ pub fn quadratic<const N: usize>(matrix: &Square<N>, vector: [f64; N]) -> f64 {
         .sum()
 }
 
+/// Whether all entries differ by less than a `distance`; not where one is NaN.
+pub fn is_near(one: &[f64; 4], other: &[f64; 4], distance: f64) -> bool {
+    (one.iter().zip(other)).all(|(one, other)| (one - other).abs() < distance)
+}
+
 /// Integer part of a coordinate; 0 for a negative value or NaN.
 #[expect(
     clippy::cast_possible_truncation,

@@ -57,20 +57,17 @@ impl BlurFit {
 
     /// The result: the explained share takes the place of the edge share, and sigma that of the growth.
     pub fn recognition(&self) -> Recognition {
+        let [a, b] = &self.outlines;
         let [ua, va, ub, vb] = self.features;
         Recognition {
             features: self.features,
             covariance: self.covariance,
-            scores: [
-                [ua, va, self.outlines[0].area],
-                [ub, vb, self.outlines[1].area],
-            ]
-            .map(|[u, v, area]| BandScore {
-                pixels: area,
+            scores: [(a, [ua, va]), (b, [ub, vb])].map(|(outline, centroid)| BandScore {
+                pixels: outline.area,
                 edges: self.explained,
                 growth: self.sigma,
                 mahalanobis_squared: self.mahalanobis_squared,
-                centroid: [u, v],
+                centroid,
                 ..BandScore::default()
             }),
             rejections: [None; 2],

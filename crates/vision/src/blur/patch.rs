@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::math::{floor, real, single};
 use crate::recognition::Outline;
-use crate::scan::{Affine, Consumer, Frame, Group, Row};
+use crate::scan::{Affine, Frame, Row};
 
 /// Largest number of samples in a row and in a column: larger patches are sampled more coarsely.
 pub const SIDE: usize = 64;
@@ -69,12 +69,15 @@ impl Patch {
         let means = self.differences.chunks_mut(self.columns.max(1));
         for (row, into) in means.enumerate() {
             for v in (0..step).map(|offset| rows.start + row * step + offset) {
-                Row::of(frame, v, groups.clone()).feed(Sample {
-                    channels,
-                    skip: columns.start - groups.start,
-                    step,
-                    into: &mut *into,
-                });
+                let pixels = Row::of(frame, v, groups.clone());
+                for (u, sums) in (columns.clone()).step_by(step).zip(&mut *into) {
+                    for u in u..u + step {
+                        let pixel = pixels.pixel(u - groups.start);
+                        for (sum, channel) in sums.iter_mut().zip(&channels) {
+                            *sum += single(channel.of(pixel));
+                        }
+                    }
+                }
             }
         }
     }
@@ -157,33 +160,6 @@ impl Patch {
             self.origin[0] + u * self.step,
             self.origin[1] + v * self.step,
         ]
-    }
-}
-
-struct Sample<'a> {
-    channels: [Affine; 2],
-    skip: usize,
-    step: usize,
-    into: &'a mut [[f32; 2]],
-}
-
-impl Consumer for Sample<'_> {
-    type Outcome = ();
-
-    fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>) {
-        let pixels = groups.flat_map(|group| (0..P).map(move |pixel| (group, pixel)));
-        let wanted = pixels.skip(self.skip).take(self.step * self.into.len());
-        for (index, (group, pixel)) in wanted.enumerate() {
-            let Some(sums) = self.into.get_mut(index / self.step) else {
-                break;
-            };
-            for (sum, Affine { weights, constant }) in sums.iter_mut().zip(&self.channels) {
-                let value: f64 = (weights.iter().enumerate())
-                    .map(|(channel, weight)| weight * f64::from(group.channel(pixel, channel)))
-                    .sum();
-                *sum += single(value + constant);
-            }
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Sample points along an outline, and the edges of the marker pixels near them.
 
-use super::outline::{OUTLINE_CORNERS, Outline};
+use super::outline::{OUTLINE_CORNERS, Outline, RIM};
 use crate::math::real;
 use crate::scan::RunMap;
 
@@ -10,13 +10,6 @@ const SAMPLES: usize = 96;
 const BORDER: f64 = 2.0;
 /// Samples nearer than this to where a rim meets a side are left out (px): the low-pass rounds the marker off there.
 const CORNER: f64 = 2.5;
-/// Corners of the outline at which a rim meets a side.
-const RIM_ENDS: [usize; 4] = [
-    0,
-    OUTLINE_CORNERS / 2 - 1,
-    OUTLINE_CORNERS / 2,
-    OUTLINE_CORNERS - 1,
-];
 
 /// A point on an outline.
 #[derive(Clone, Copy, Default)]
@@ -48,7 +41,7 @@ impl Contour {
             .sum();
         let signed: f64 = lines().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
         let turn = signed.signum();
-        let ends = RIM_ENDS.map(|index| corners[index]);
+        let ends = [0, RIM - 1, RIM, OUTLINE_CORNERS - 1].map(|index| corners[index]);
         let step = length / real(SAMPLES);
         let mut contour = Self {
             samples: [Sample::default(); SAMPLES],
@@ -71,7 +64,7 @@ impl Contour {
                     *sample = Sample {
                         offset,
                         normal: [turn * dv / length, -turn * du / length],
-                        is_side: index % (OUTLINE_CORNERS / 2) == OUTLINE_CORNERS / 2 - 1,
+                        is_side: index % RIM == RIM - 1,
                     };
                     contour.count += 1;
                 }

@@ -83,8 +83,8 @@ pub fn fit(
             row[index] = common + apart;
             row[other] = -apart;
         }
-        let (mut edges, mut visible) = ([0.0; 2], [0.0; 2]);
-        let (mut rims, mut visible_rims) = ([0.0; 2], [0.0; 2]);
+        // By part: rims and sides of A, rims and sides of B.
+        let (mut edges, mut visible) = ([0.0; 4], [0.0; 4]);
         for (band, contour) in contours
             .iter()
             .enumerate()
@@ -101,15 +101,13 @@ pub fn fit(
                     Edge::Missing => None,
                     Edge::At(offset) => Some(offset),
                 };
-                visible[band] += 1.0;
-                visible_rims[band] += f64::from(u8::from(!sample.is_side));
+                visible[part] += 1.0;
                 let Some(offset) = offset else { continue };
                 let share = (offset - growth[part]) / tolerance;
                 if share.abs() >= 1.0 {
                     continue;
                 }
-                edges[band] += 1.0;
-                rims[band] += f64::from(u8::from(!sample.is_side));
+                edges[part] += 1.0;
                 let weight = (1.0 - share * share).powi(2)
                     / (settings.edge_deviation * settings.edge_deviation);
                 let [nu, nv] = sample.normal;
@@ -137,10 +135,12 @@ pub fn fit(
                 rims: growth[part],
                 sides: growth[part + 1],
             }),
-            edges: [0, 1].map(|band| edges[band] / f64::max(visible[band], 1.0)),
-            rims: [0, 1].map(|band| match visible_rims[band] {
+            edges: [0, 2].map(|part| {
+                (edges[part] + edges[part + 1]) / f64::max(visible[part] + visible[part + 1], 1.0)
+            }),
+            rims: [0, 2].map(|part| match visible[part] {
                 count if count < LEAST_RIM_SAMPLES => 1.0,
-                count => rims[band] / count,
+                count => edges[part] / count,
             }),
             mahalanobis_squared: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
         });

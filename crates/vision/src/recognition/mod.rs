@@ -4,7 +4,6 @@ mod contour;
 mod fit;
 mod outcome;
 mod outline;
-mod pairing;
 mod posture_table;
 mod prediction;
 mod rejection;

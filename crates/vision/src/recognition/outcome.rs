@@ -2,11 +2,11 @@
 
 use super::fit::Fit;
 use super::outline::Outline;
-use super::prediction::BandPrediction;
-use super::prediction::{SECTION_DISCS, SectionDisc};
+use super::prediction::{BandPrediction, SECTION_DISCS, SectionDisc};
 use super::rejection::Rejection;
 use super::score::{BandScore, score};
-use super::surroundings::{LEAST_CONTRAST, is_instrument, section_contrast};
+use super::surroundings::{LEAST_CONTRAST, contrast_between, section_contrast};
+use crate::math::is_near;
 use crate::scan::{Frame, RunMap};
 use crate::settings::Settings;
 
@@ -85,11 +85,15 @@ impl Recognition {
         if self.rejections != [None; 2] {
             return;
         }
-        let is_section = section_contrast(frame, section).map(|value| value > LEAST_CONTRAST);
-        let is_accepted = match (is_instrument(frame, outlines), is_section) {
-            (Some(between), Some(section)) => between && section,
-            (None, None) => self.is_certain(settings),
-            (Some(known), None) | (None, Some(known)) => known,
+        let parts = [
+            contrast_between(frame, outlines),
+            section_contrast(frame, section),
+        ];
+        let mut known = parts.into_iter().flatten();
+        let is_accepted = if parts == [None; 2] {
+            self.is_certain(settings)
+        } else {
+            known.all(|contrast| contrast > LEAST_CONTRAST)
         };
         if !is_accepted {
             self.rejections = [Some(Rejection::NoInstrument); 2];
@@ -147,12 +151,7 @@ impl Recognition {
     /// Where the other is clear and in the same place, the first that was found is kept. Elsewhere the logarithm of the
     /// number of explained marker pixels counts too: parts of one band may look like two small ones.
     pub(crate) fn is_better(&self, other: &Self, settings: &Settings) -> bool {
-        let is_same = self
-            .features
-            .iter()
-            .zip(other.features)
-            .all(|(one, other)| (one - other).abs() < SAME_PLACE);
-        if is_same {
+        if is_near(&self.features, &other.features, SAME_PLACE) {
             return !other.is_clear(settings) && self.quality(settings) > other.quality(settings);
         }
         let quality = |one: &Self| {
@@ -171,7 +170,7 @@ impl Recognition {
 fn is_located(score: &BandScore, rejection: Option<Rejection>, settings: &Settings) -> bool {
     match rejection {
         None => true,
-        Some(Rejection::Outside { .. }) => score.is_clear(settings),
+        Some(Rejection::Outside(_)) => score.is_clear(settings),
         Some(_) => false,
     }
 }

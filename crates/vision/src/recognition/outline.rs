@@ -6,8 +6,10 @@ use crate::scan::RunMap;
 /// more on the pixel raster than on the position.
 const LEAST_PIECE: f64 = 0.15;
 
-/// Corners of an outline: 13 on each of its two arcs, the rims; one side joins their ends, one their starts.
+/// Corners of an outline: half of them on each of its two arcs, the rims; one side joins their ends, one their starts.
 pub const OUTLINE_CORNERS: usize = 26;
+/// Corners on the proximal rim, the first; those on the distal rim have the opposite order.
+pub const RIM: usize = OUTLINE_CORNERS / 2;
 
 /// Outline of a band's visible side: two arcs, the rims, joined by two lines, the sides.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! Postures of the whole workspace, compared with the regions of an image where nothing else predicts the bands.
 
 use super::outline::Outline;
-use super::pairing::{Pair, TRIALS};
-use crate::math::{real, real_sum, single};
+use super::starts::{Candidate, Ranking, TRIALS, rank};
+use crate::math::{is_near, real, real_sum, single};
 use crate::scan::Region;
 
 /// Largest distance of a region from a posture's band (px): the postures of the table are this far apart.
@@ -50,17 +50,8 @@ pub const BLOBS: usize = 6;
 /// Postures whose features differ by less than this are the same (px).
 const BLOB_DISTANCE: f64 = 5.0;
 
-/// Likeliest postures of bands that are one region, the likeliest first, with their costs.
-pub type BlobPostures = [Option<(f32, [f64; 4])>; BLOBS];
-
-/// Regions that may be the bands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
-    /// Regions of the bands.
-    pub pair: Pair,
-    /// Features of the posture, moved to the regions (px).
-    pub features: [f64; 4],
-}
+/// Features of the likeliest postures of bands that are one region (px).
+pub type BlobPostures = Ranking<[f64; 4], BLOBS>;
 
 impl Posture {
     /// Features of the posture, moved by `offset` (px).
@@ -107,6 +98,14 @@ impl Shape {
         [0, 1].map(|axis| self.centroid[axis] - other.centroid[axis])
     }
 
+    /// Offset from where a shape is expected, and the cost of offset and size; None if it is too far away.
+    fn cost(&self, expected: &Self) -> Option<([f32; 2], f32)> {
+        let offset = self.offset(expected);
+        let square = square(offset);
+        let cost = square / (POSITION_STD * POSITION_STD) + self.size_cost(expected);
+        (square < REACH * REACH).then_some((offset, cost))
+    }
+
     /// How badly sizes agree: part of a band may be hidden.
     fn size_cost(&self, expected: &Self) -> f32 {
         let area = ((self.log_area - expected.log_area) / AREA_STD).powi(2);
@@ -141,114 +140,50 @@ impl PostureTable {
         self.postures.is_empty()
     }
 
-    /// The likeliest pairs of regions, the likeliest first.
-    ///
-    /// Postures of both bands in one region are kept in `blobs` too.
+    /// The likeliest pairs of regions. Postures of both bands in one region are ranked in `blobs` too.
     pub fn likely_pairs(
         &self,
         regions: &[Region],
         blobs: &mut BlobPostures,
-    ) -> [Option<Candidate>; TRIALS] {
-        let mut kept: [Option<(f32, Candidate)>; TRIALS] = [None; TRIALS];
+    ) -> Ranking<Candidate, TRIALS> {
+        let mut kept = [None; TRIALS];
         let mut shapes = [None; crate::scan::MAX_REGIONS];
         for (shape, region) in shapes.iter_mut().zip(regions) {
             *shape = Some(Shape::of_region(region));
         }
         let shapes = || shapes.iter().flatten().enumerate();
         for posture in &self.postures {
+            let mut keep = |cost: f32, pair, offset| {
+                let features = posture.features(offset);
+                rank(&mut kept, cost.into(), (pair, features), |other| {
+                    other.0 == pair
+                });
+            };
             let [a, b] = &posture.bands;
             for (index, shape) in shapes() {
-                let offset = shape.offset(a);
-                if square(offset) < REACH * REACH {
-                    let cost = square(offset) / (POSITION_STD * POSITION_STD) + shape.size_cost(a);
+                if let Some((offset, cost)) = shape.cost(a) {
                     for (other, second) in shapes().filter(|(other, _)| *other != index) {
                         let [u, v] = second.offset(b);
                         let error = square([u - offset[0], v - offset[1]]);
                         if error < VECTOR_REACH * VECTOR_REACH {
-                            let cost =
+                            let both =
                                 cost + error / (VECTOR_STD * VECTOR_STD) + second.size_cost(b);
-                            keep(&mut kept, cost, [Some(index), Some(other)], posture, offset);
+                            keep(both, [Some(index), Some(other)], offset);
                         }
                     }
-                    keep(
-                        &mut kept,
-                        cost + MISSING_COST,
-                        [Some(index), None],
-                        posture,
-                        offset,
-                    );
+                    keep(cost + MISSING_COST, [Some(index), None], offset);
                 }
-                let offset = shape.offset(b);
-                if square(offset) < REACH * REACH {
-                    let cost = square(offset) / (POSITION_STD * POSITION_STD) + shape.size_cost(b);
-                    keep(
-                        &mut kept,
-                        cost + MISSING_COST,
-                        [None, Some(index)],
-                        posture,
-                        offset,
-                    );
+                if let Some((offset, cost)) = shape.cost(b) {
+                    keep(cost + MISSING_COST, [None, Some(index)], offset);
                 }
-                let offset = shape.offset(&posture.both);
-                if square(offset) < REACH * REACH {
-                    let cost = square(offset) / (POSITION_STD * POSITION_STD)
-                        + shape.size_cost(&posture.both);
-                    keep(&mut kept, cost, [Some(index); 2], posture, offset);
-                    keep_blob(blobs, cost, posture, offset);
+                if let Some((offset, cost)) = shape.cost(&posture.both) {
+                    keep(cost, [Some(index); 2], offset);
+                    let features = posture.features(offset);
+                    let same = |other: &[f64; 4]| is_near(&features, other, BLOB_DISTANCE);
+                    rank(blobs, cost.into(), features, same);
                 }
             }
         }
-        kept.map(|one| one.map(|(_, candidate)| candidate))
+        kept
     }
-}
-
-/// Keeps the best posture of each pair.
-fn keep(
-    kept: &mut [Option<(f32, Candidate)>; TRIALS],
-    cost: f32,
-    pair: Pair,
-    posture: &Posture,
-    offset: [f32; 2],
-) {
-    if kept[TRIALS - 1].is_some_and(|(most, _)| cost >= most) {
-        return;
-    }
-    let same = kept
-        .iter()
-        .position(|one| one.is_some_and(|(_, other)| other.pair == pair));
-    if same.is_some_and(|index| kept[index].is_some_and(|(less, _)| less <= cost)) {
-        return;
-    }
-    let last = same.unwrap_or(TRIALS - 1);
-    let rank = kept
-        .iter()
-        .position(|one| one.is_none_or(|(less, _)| cost < less))
-        .unwrap_or(last);
-    kept[rank..=last].rotate_right(1);
-    let features = posture.features(offset);
-    kept[rank] = Some((cost, Candidate { pair, features }));
-}
-
-/// Keeps the best of postures that are nearly the same.
-fn keep_blob(kept: &mut BlobPostures, cost: f32, posture: &Posture, offset: [f32; 2]) {
-    if kept[BLOBS - 1].is_some_and(|(most, _)| cost >= most) {
-        return;
-    }
-    let features = posture.features(offset);
-    let is_same = |other: &[f64; 4]| {
-        (0..4).all(|index| (features[index] - other[index]).abs() < BLOB_DISTANCE)
-    };
-    let same = kept
-        .iter()
-        .position(|one| one.is_some_and(|(_, other)| is_same(&other)));
-    if same.is_some_and(|index| kept[index].is_some_and(|(less, _)| less <= cost)) {
-        return;
-    }
-    let last = same.unwrap_or(BLOBS - 1);
-    let rank = kept
-        .iter()
-        .position(|one| one.is_none_or(|(less, _)| cost < less))
-        .unwrap_or(last);
-    kept[rank..=last].rotate_right(1);
-    kept[rank] = Some((cost, features));
 }

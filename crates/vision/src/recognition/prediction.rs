@@ -48,12 +48,6 @@ impl BandPrediction {
         let is_small = 4.0 * area <= size_u * size_v;
         (is_small && window.left < window.right && window.top < window.bottom).then_some(window)
     }
-
-    /// Shift from the middle of the two predicted bands to `[u, v]` (px).
-    pub(crate) fn shift_to(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let [ua, va, ub, vb] = self.features;
-        [u - f64::midpoint(ua, ub), v - f64::midpoint(va, vb)]
-    }
 }
 
 /// Discs along the section next to the tip.

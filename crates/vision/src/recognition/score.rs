@@ -44,25 +44,17 @@ impl BandScore {
         let shortage = (self.edges / settings.clear.least_edges).min(1.0).powi(2);
         let least_exclusive = settings.least_exclusive * self.coverage;
         if self.inside < settings.least_inside {
-            Some(Rejection::Outside {
-                share: 1.0 - self.inside,
-            })
+            Some(Rejection::Outside(1.0 - self.inside))
         } else if self.coverage < settings.least_coverage || self.exclusive < least_exclusive {
-            Some(Rejection::Hidden {
-                share: self.exclusive,
-            })
+            Some(Rejection::Hidden(self.exclusive))
         } else if self.spill > settings.largest_spill * self.coverage {
-            Some(Rejection::Spill { share: self.spill })
+            Some(Rejection::Spill(self.spill))
         } else if self.edges < settings.least_edges {
-            Some(Rejection::MissingEdges { share: self.edges })
-        } else if self.mahalanobis_squared.is_nan()
-            || self.mahalanobis_squared > settings.largest_surprise * shortage
-        {
-            Some(Rejection::Elsewhere {
-                distance: self.mahalanobis_squared.sqrt(),
-            })
-        } else {
+            Some(Rejection::MissingEdges(self.edges))
+        } else if self.mahalanobis_squared <= settings.largest_surprise * shortage {
             None
+        } else {
+            Some(Rejection::Elsewhere(self.mahalanobis_squared.sqrt()))
         }
     }
 }
@@ -106,7 +98,7 @@ pub fn score(
     for (rejection, rims) in rejections.iter_mut().zip(fit.rims) {
         // The sides alone do not determine the position along them.
         if rejection.is_none() && rims < settings.least_rims {
-            *rejection = Some(Rejection::MissingEdges { share: rims });
+            *rejection = Some(Rejection::MissingEdges(rims));
         }
     }
     // Where two bands are too weak on average the weaker one is rejected; the other then has to pass alone.
@@ -115,9 +107,7 @@ pub fn score(
     if rejections == [None; 2]
         && f64::midpoint(edges[0], edges[1]) < settings.least_edges_on_average
     {
-        rejections[weaker] = Some(Rejection::MissingEdges {
-            share: edges[weaker],
-        });
+        rejections[weaker] = Some(Rejection::MissingEdges(edges[weaker]));
     }
     (scores, rejections)
 }

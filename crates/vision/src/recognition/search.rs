@@ -2,11 +2,11 @@
 
 use super::fit::{COARSE, FINE, Fit, fit};
 use super::outcome::{Recognition, UNKNOWN};
-use super::pairing::{TRIALS, likely_pairs};
 use super::posture_table::{BlobPostures, PostureTable};
 use super::prediction::{BandPrediction, BandPredictor};
 use super::rejection::Rejection;
-use super::starts::{SAME, centroids, uncut_centroids};
+use super::starts::{SAME, TRIALS, centroids, likely_pairs, uncut_centroids};
+use crate::math::is_near;
 use crate::scan::{Frame, Region, RunMap};
 use crate::settings::Settings;
 
@@ -52,8 +52,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
                 continue;
             };
             // Many pairs lead to the same fit.
-            let is_same =
-                |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
+            let is_same = |before: &[f64; 4]| is_near(before, &first.features, SAME);
             if tried.iter().any(is_same) {
                 continue;
             }
@@ -75,8 +74,8 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
             return Recognition::none(Rejection::NoRegion);
         };
         match found.rejections {
-            [None, Some(_)] => self.check_single(found, 0, &prior, regions),
-            [Some(_), None] => self.check_single(found, 1, &prior, regions),
+            [None, Some(_)] => self.check_single(found, 0, regions),
+            [Some(_), None] => self.check_single(found, 1, regions),
             _ => found,
         }
     }
@@ -88,35 +87,25 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         prior: &BandPrediction,
         blobs: &mut BlobPostures,
     ) -> [Option<[f64; 4]>; 2 * TRIALS] {
+        let is_from_prior = self.predictor.is_located() || self.postures.is_empty();
+        let candidates = if is_from_prior {
+            likely_pairs(regions, prior)
+        } else {
+            self.postures.likely_pairs(regions, blobs)
+        };
         let mut starts = [None; 2 * TRIALS];
-        let (places, _) = starts.as_chunks_mut::<2>();
-        if self.predictor.is_located() || self.postures.is_empty() {
-            let pairs = likely_pairs(regions, prior).into_iter().flatten();
-            for (place, pair) in places.iter_mut().zip(pairs) {
-                let observed = centroids(pair, prior, regions);
-                *place = [Some(observed), uncut_centroids(observed, prior, self.map)];
-            }
-            return starts;
-        }
-        let candidates = self
-            .postures
-            .likely_pairs(regions, blobs)
-            .into_iter()
-            .flatten();
-        for (place, candidate) in places.iter_mut().zip(candidates) {
-            let mut observed = candidate.features;
-            if candidate.pair[0] != candidate.pair[1] {
-                for (band, region) in candidate.pair.into_iter().enumerate() {
-                    if let Some(region) = region.and_then(|index| regions.get(index)) {
-                        [observed[2 * band], observed[2 * band + 1]] = region.centroid();
-                    }
-                }
-            }
-            let uncut = self
-                .predictor
-                .predict(observed, REGION_STD)
-                .and_then(|near| uncut_centroids(observed, &near, self.map));
-            *place = [Some(observed), uncut];
+        for (places, (_, candidate)) in starts
+            .chunks_exact_mut(2)
+            .zip(candidates.into_iter().flatten())
+        {
+            let observed = centroids(candidate, regions);
+            let uncut = if is_from_prior {
+                uncut_centroids(observed, prior, self.map)
+            } else {
+                let near = self.predictor.predict(observed, REGION_STD);
+                near.and_then(|near| uncut_centroids(observed, &near, self.map))
+            };
+            places.copy_from_slice(&[Some(observed), uncut]);
         }
         starts
     }
@@ -128,17 +117,11 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
     }
 
     /// Rejects a band found alone if it is not complete enough, or if the same pixels fit the other band as well.
-    fn check_single(
-        &self,
-        mut found: Recognition,
-        band: usize,
-        prior: &BandPrediction,
-        regions: &[Region],
-    ) -> Recognition {
+    fn check_single(&self, mut found: Recognition, band: usize, regions: &[Region]) -> Recognition {
         let score = found.scores[band];
         let least = self.settings.least_edges_alone;
         if score.edges < least || score.coverage < 0.75 * least {
-            found.rejections[band] = Some(Rejection::MissingEdges { share: score.edges });
+            found.rejections[band] = Some(Rejection::MissingEdges(score.edges));
             found.erase_rejected();
             return found;
         }
@@ -153,7 +136,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         pair[1 - band] = nearest;
         let mut here = UNKNOWN;
         [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
-        let starts = [here, centroids(pair, prior, regions)];
+        let starts = [here, centroids((pair, UNKNOWN), regions)];
         let is_ambiguous = starts.iter().any(|observed| {
             self.recognise_at(*observed, REGION_STD)
                 .is_some_and(|other| {

@@ -2,6 +2,8 @@
 
 /// Columns of a block: the bits of a word.
 pub const BLOCK: usize = 64;
+/// Bytes of a block where a pixel has three.
+pub const BYTES: usize = 3 * BLOCK;
 
 /// Rows of a strip: enough that the work once per strip costs little, and few enough that a strip is still in
 /// the first cache when it is read again.

@@ -1,8 +1,11 @@
 //! Fisher's linear discriminant, Eq. (12).
 
 use super::format::PixelFormat;
+use super::frame::Frame;
 use super::projection::{Projection, RANGE};
+use super::row::Row;
 use crate::error::Error;
+use crate::math::floor;
 
 /// Classifies colours: marker are those with `w_b B + w_g G + w_r R > threshold`, Eq. (12).
 ///
@@ -24,7 +27,7 @@ pub struct ColorDiscriminant {
 /// Weights of the three channels of a format, and the weighted sum where all three are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
-    /// Weights in the order of [`Group`](super::Group).
+    /// Weights of the channels in the order of [`Row::pixel`].
     pub weights: [f64; 3],
     /// Weighted sum at 0.
     pub constant: f64,
@@ -83,6 +86,27 @@ impl Affine {
             }
         };
         Self { weights, constant }
+    }
+
+    /// The weighted sum of a pixel's channels.
+    pub fn of(&self, pixel: [u8; 3]) -> f64 {
+        let terms = self.weights.iter().zip(pixel);
+        terms.fold(self.constant, |sum, (weight, value)| {
+            sum + weight * f64::from(value)
+        })
+    }
+
+    /// The weighted sum of the pixel nearest to `[u, v]` (px); None outside the frame.
+    pub fn at(&self, frame: &impl Frame, [u, v]: [f64; 2]) -> Option<f64> {
+        if !(u >= -0.5 && v >= -0.5) {
+            return None;
+        }
+        let (column, row) = (floor(u + 0.5), floor(v + 0.5));
+        (column < frame.width() && row < frame.height()).then(|| {
+            let columns = frame.format().whole_groups(column..column + 1);
+            let pixel = column - columns.start;
+            self.of(Row::of(frame, row, columns).pixel(pixel))
+        })
     }
 
     /// The largest magnitude of the weighted sum over all bytes; at least half of the range of a channel.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 
 use super::active_blocks::{ActiveBlocks, BLOCK, STRIP};
-use super::lowpass::{Block, LowPass, RowIndex, replicate_end};
+use super::lowpass::{Block, LowPass, replicate_end};
 use super::projection::Projection;
 use super::row::Row;
 use super::runs::runs_of_bits;
@@ -118,7 +118,7 @@ impl Filter {
         }
         for (n, pass) in (0..=index).rev().zip(&mut self.passes) {
             replicate_end(values, columns.len());
-            pass.step(simd, values, filtered, blocks, RowIndex { n, height });
+            pass.step(simd, values, filtered, blocks, (n, height));
             (values, filtered) = (filtered, values);
         }
         let words = row * self.blocks + blocks.start..row * self.blocks + blocks.end;

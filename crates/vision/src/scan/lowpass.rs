@@ -25,13 +25,6 @@ pub type Block = [i16; BLOCK];
 /// Below every projected value, and four of it still fit an `i16`.
 const FAR_BELOW: i16 = -8191;
 
-/// Row `n` of an image of `height` rows.
-#[derive(Clone, Copy, Debug)]
-pub struct RowIndex {
-    pub n: usize,
-    pub height: usize,
-}
-
 impl LowPass {
     /// Makes room for rows of this many blocks; allocates only when the number grows.
     pub fn prepare(&mut self, blocks: usize) {
@@ -47,7 +40,7 @@ impl LowPass {
         }
     }
 
-    /// Filters these blocks of row `n` into those of row `n - 1`; their first and last values are replicated.
+    /// Filters these blocks of row `n` of an image into those of row `n - 1`; their first and last values are replicated.
     ///
     /// Call it for `n` = 0, 1, ..., `height`, each time followed by [`advance`](Self::advance). The output for
     /// `n` = 0 and above `height` is meaningless; from `n` = `height` on, `row` is not read.
@@ -58,7 +51,7 @@ impl LowPass {
         row: &[Block],
         filtered: &mut [Block],
         blocks: &Range<usize>,
-        at: RowIndex,
+        (n, height): (usize, usize),
     ) {
         let [above, here, below] =
             [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, blocks));
@@ -79,7 +72,7 @@ impl LowPass {
                 [before, after],
                 row,
                 [above, here, below, filtered],
-                at,
+                (n, height),
             );
             before = S::i16s::from_slice(simd, &row[BLOCK - S::i16s::LEN..]);
         }
@@ -103,7 +96,7 @@ fn step<S: Simd>(
     [mut before, after]: [S::i16s; 2],
     row: &Block,
     [above, here, below, filtered]: [&mut Block; 4],
-    at: RowIndex,
+    (n, height): (usize, usize),
 ) {
     let lanes = S::i16s::LEN;
     let mut middle = S::i16s::from_slice(simd, &row[..lanes]);
@@ -114,7 +107,7 @@ fn step<S: Simd>(
             None => after,
         };
         let centre = S::i16s::from_slice(simd, &here[start..end]);
-        let under = if at.n < at.height {
+        let under = if n < height {
             mean::<S>(
                 shift_in::<S>(before, middle),
                 middle,
@@ -124,7 +117,7 @@ fn step<S: Simd>(
             centre
         };
         under.store_slice(&mut below[start..end]);
-        if at.n == 0 {
+        if n == 0 {
             under.store_slice(&mut here[start..end]);
         }
         let over = S::i16s::from_slice(simd, &above[start..end]);
@@ -185,8 +178,7 @@ mod tests {
                     row.as_flattened_mut()[..width].copy_from_slice(values);
                     replicate_end(&mut row, width);
                 }
-                let at = RowIndex { n, height };
-                dispatch!(level, simd => pass.step(simd, &row, &mut filtered, &blocks, at));
+                dispatch!(level, simd => pass.step(simd, &row, &mut filtered, &blocks, (n, height)));
                 pass.advance();
                 let Some(v) = n.checked_sub(1) else { continue };
                 for (u, filtered) in filtered.as_flattened()[..width].iter().enumerate() {

@@ -6,7 +6,6 @@ mod filter;
 mod format;
 mod frame;
 mod lowpass;
-mod pixel;
 mod projection;
 mod regions;
 mod row;
@@ -28,13 +27,12 @@ pub(crate) use discriminant::Affine;
 pub use discriminant::ColorDiscriminant;
 pub use format::{MAX_SIDE, PixelFormat};
 pub use frame::{Frame, Image, Window};
-pub(crate) use pixel::weighted_sum;
 pub use regions::{Labeller, Region};
-pub(crate) use row::{Consumer, Group, Row};
+pub(crate) use row::Row;
 pub(crate) use run_map::RunMap;
 pub use runs::{Runs, each_run};
 pub use scanner::MAX_REGIONS;
-pub(crate) use scanner::Scanner;
+pub(crate) use scanner::{Regions, Scanner};
 pub use segment::Segmenter;
 
 /// Instruction sets to test: the best of this machine, the next that multiplies bytes in pairs, and the least.

@@ -4,7 +4,7 @@ use super::format::MAX_SIDE;
 use crate::math::real_sum;
 
 /// An 8-connected set of marker pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Region {
     /// Number of pixels (px).
     pub area: u64,

@@ -86,6 +86,20 @@ impl<'a> Row<'a> {
         }
     }
 
+    /// The three channels of one pixel; 0 beyond the row.
+    pub fn pixel(self, column: usize) -> [u8; 3] {
+        let byte = |bytes: &[u8], index: usize| bytes.get(index).copied().unwrap_or_default();
+        let pair = column / 2;
+        match self {
+            Self::Triples(bytes) => [0, 1, 2].map(|channel| byte(bytes, 3 * column + channel)),
+            Self::Quadruples(bytes) => [0, 1, 2].map(|channel| byte(bytes, 4 * column + channel)),
+            Self::Yuyv(bytes) => [2 * column, 4 * pair + 1, 4 * pair + 3].map(|at| byte(bytes, at)),
+            Self::Uyvy(bytes) => [2 * column + 1, 4 * pair, 4 * pair + 2].map(|at| byte(bytes, at)),
+            Self::Nv12(y, uv) => [byte(y, column), byte(uv, 2 * pair), byte(uv, 2 * pair + 1)],
+            Self::I420(y, u, v) => [byte(y, column), byte(u, pair), byte(v, pair)],
+        }
+    }
+
     /// Passes the pixels to a consumer, left to right.
     #[inline(always)]
     pub fn feed<C: Consumer>(self, consumer: C) -> C::Outcome {

@@ -25,9 +25,10 @@ impl RunMap {
         self.runs.reserve(MAX_RUNS);
     }
 
-    /// Adds a run to the current row, to the right of those before.
-    pub fn add(&mut self, start: usize, end: usize) {
+    /// Adds a run to row `v`, below or to the right of those before.
+    pub fn add(&mut self, v: usize, start: usize, end: usize) {
         debug_assert!(start < end && end <= MAX_SIDE);
+        self.end_rows(v);
         if let (Ok(start), Ok(end)) = (u32::try_from(start), u32::try_from(end))
             && self.runs.len() < MAX_RUNS
         {
@@ -35,7 +36,7 @@ impl RunMap {
         }
     }
 
-    /// Ends all rows above row `v`, which becomes the current row.
+    /// Ends all rows above row `v`.
     pub fn end_rows(&mut self, v: usize) {
         self.ends.resize(v.max(self.ends.len()), self.runs.len());
     }

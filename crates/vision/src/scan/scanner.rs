@@ -9,6 +9,30 @@ use super::segment::Segmenter;
 /// Only the largest regions, this many, are kept: it bounds the time on a noisy frame.
 pub const MAX_REGIONS: usize = 32;
 
+/// The largest regions of a scan, the largest first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Regions {
+    kept: [Region; MAX_REGIONS],
+    count: usize,
+}
+
+impl Regions {
+    /// As a slice.
+    pub fn as_slice(&self) -> &[Region] {
+        self.kept.get(..self.count).unwrap_or_default()
+    }
+
+    fn keep(&mut self, region: Region) {
+        let larger = |kept: &Region| kept.area >= region.area;
+        let index = self.as_slice().partition_point(larger);
+        self.count = MAX_REGIONS.min(self.count + 1);
+        if let Some(smaller @ [_, ..]) = self.kept.get_mut(index..self.count) {
+            smaller.rotate_right(1);
+            smaller[0] = region;
+        }
+    }
+}
+
 /// Finds regions and runs of marker pixels, and keeps those of the last frame.
 #[derive(Clone, Debug)]
 pub struct Scanner {
@@ -17,8 +41,8 @@ pub struct Scanner {
     minimum_area: u64,
     /// The marker pixels of the last [`find`](Self::find).
     pub map: RunMap,
-    /// The regions, the largest first.
-    pub regions: Vec<Region>,
+    /// The regions.
+    pub regions: Regions,
 }
 
 impl Scanner {
@@ -30,27 +54,23 @@ impl Scanner {
             labeller: Labeller::default(),
             minimum_area,
             map: RunMap::default(),
-            regions: Vec::with_capacity(MAX_REGIONS),
+            regions: Regions::default(),
         }
     }
 
     /// Finds regions and runs in a window by one of the discriminants.
     pub fn find(&mut self, frame: &impl Frame, window: Window, discriminant: usize) {
-        self.regions.clear();
-        let mut map = std::mem::take(&mut self.map);
-        let window = window.within(frame);
-        map.start(frame.width(), frame.height());
-        map.end_rows(window.top);
-        self.collect(frame, window, discriminant, Some(&mut map));
-        map.end_rows(frame.height());
-        self.map = map;
+        self.regions = Regions::default();
+        self.map.start(frame.width(), frame.height());
+        self.collect(frame, window, discriminant, true);
+        self.map.end_rows(frame.height());
     }
 
     /// Finds the regions in windows by the first discriminant; each ends where its window does.
     pub fn find_regions(&mut self, frame: &impl Frame, windows: &[Window]) {
-        self.regions.clear();
+        self.regions = Regions::default();
         for window in windows {
-            self.collect(frame, *window, 0, None);
+            self.collect(frame, *window, 0, false);
         }
     }
 
@@ -59,34 +79,29 @@ impl Scanner {
         frame: &impl Frame,
         window: Window,
         discriminant: usize,
-        mut map: Option<&mut RunMap>,
+        is_mapped: bool,
     ) {
         let Self {
             segmenters,
             labeller,
             minimum_area,
+            map,
             regions,
-            ..
         } = self;
         let Some(segmenter) = segmenters.get_mut(discriminant) else {
             return;
         };
         let mut keep = |region: Region| {
-            let index = regions.partition_point(|kept| kept.area >= region.area);
-            if region.area >= *minimum_area && index < MAX_REGIONS {
-                regions.truncate(MAX_REGIONS - 1);
-                regions.insert(index, region);
+            if region.area >= *minimum_area {
+                regions.keep(region);
             }
         };
         labeller.start(frame.width());
         segmenter.each_row_in(frame, window, |v, runs| {
-            if let Some(map) = &mut map {
-                map.end_rows(v);
-            }
             runs.each(|start, end| {
                 labeller.add(v, start, end);
-                if let Some(map) = &mut map {
-                    map.add(start, end);
+                if is_mapped {
+                    map.add(v, start, end);
                 }
             });
             labeller.end_row(&mut keep);

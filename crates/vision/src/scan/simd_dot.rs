@@ -1,14 +1,11 @@
 //! Weighted sums of pixels of three bytes, compared with a level, by an instruction that multiplies bytes in pairs.
 //!
-//! On other processors, and for the other formats, the compiler's vectorisation of [`Group`](super::Group) is as fast.
+//! On other processors, and for the other formats, the compiler's vectorisation of [`Group`](super::row::Group) is as fast.
 
 use fearless_simd::prelude::*;
 
-use super::active_blocks::BLOCK;
+use super::active_blocks::BYTES;
 use super::byte_dot::ByteDot;
-
-/// Bytes of a block of pixels.
-const BYTES: usize = 3 * BLOCK;
 
 /// Finds the blocks in which a weighted sum of a pixel's three bytes reaches a level.
 ///
@@ -17,23 +14,25 @@ const BYTES: usize = 3 * BLOCK;
 /// The sum at 6 k + 4 belongs to no pixel and is 0.
 #[derive(Clone, Debug)]
 pub struct SimdDot {
-    weights_64: [Weights<64>; 3],
-    weights_32: [Weights<32>; 3],
+    /// Weights of the bytes of a vector and of those of the vector two bytes on, from each of six bytes on.
+    weights: [[i8; 64 + 6]; 2],
     level: i16,
     /// Index of each byte of the vector that starts two bytes on, in this vector and the next. A field, because
     /// with a constant the compiler takes two permutations instead of one.
     two_on: [u8; 64],
 }
 
-/// Weights of the bytes of one of the three vectors in 3 N bytes, and of those of the vector two bytes on.
-type Weights<const N: usize> = [[i8; N]; 2];
-
 impl SimdDot {
     /// Takes weights that fit a byte; 255 times the sum of those of one sign must be below `i16::MAX`.
     pub fn new(weights: [i16; 3], level: i16) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "weights fit a byte")]
+        let [first, second, third] = weights.map(|weight| weight as i8);
+        let six = [
+            [first, second, 0, first, 0, 0],
+            [third, 0, second, third, 0, 0],
+        ];
         Self {
-            weights_64: [0, 64, 128].map(|start| byte_weights(start, weights)),
-            weights_32: [0, 32, 64].map(|start| byte_weights(start, weights)),
+            weights: six.map(|six| std::array::from_fn(|index| six[index % 6])),
             level,
             two_on: std::array::from_fn(|index| index.to_le_bytes()[0] + 2),
         }
@@ -46,21 +45,9 @@ impl SimdDot {
     #[inline(always)]
     pub fn mark<S: Simd>(&self, simd: S, bytes: &[u8], active: &mut [u64]) {
         if let Some(wide) = simd.level().as_avx512() {
-            mark(
-                wide,
-                bytes,
-                (&self.weights_64, self.level),
-                &self.two_on,
-                active,
-            );
+            mark(wide, bytes, self, active);
         } else if let Some(wide) = simd.level().as_avx2() {
-            mark(
-                wide,
-                bytes,
-                (&self.weights_32, self.level),
-                &self.two_on,
-                active,
-            );
+            mark(wide, bytes, self, active);
         }
     }
 }
@@ -71,37 +58,14 @@ pub fn is_fast<S: Simd>(simd: S) -> bool {
     simd.level().as_avx2().is_some()
 }
 
-fn byte_weights<const N: usize>(start: usize, weights: [i16; 3]) -> Weights<N> {
-    #[expect(clippy::cast_possible_truncation, reason = "weights fit a byte")]
-    let [first, second, third] = weights.map(|weight| weight as i8);
-    let mut both = [[0; N]; 2];
-    let [here, two_on] = &mut both;
-    let pairs = here.as_chunks_mut().0.iter_mut();
-    let pairs = pairs.zip(two_on.as_chunks_mut().0);
-    for ((here, two_on), at) in pairs.zip((start..).step_by(2)) {
-        (*here, *two_on) = match at % 6 {
-            0 => ([first, second], [third, 0]),
-            2 => ([0, first], [second, third]),
-            _ => ([0, 0], [0, 0]),
-        };
-    }
-    both
-}
-
 #[inline(always)]
-fn mark<S: ByteDot, const N: usize>(
-    simd: S,
-    bytes: &[u8],
-    (weights, level): (&[Weights<N>; 3], i16),
-    two_on: &[u8; 64],
-    active: &mut [u64],
-) {
-    let registers = Registers::new(simd, weights, level, two_on);
+fn mark<S: ByteDot>(simd: S, bytes: &[u8], dot: &SimdDot, active: &mut [u64]) {
+    let registers = Registers::new(simd, dot);
     let (blocks, rest) = bytes.as_chunks::<BYTES>();
     for (word, blocks) in active.iter_mut().zip(blocks.chunks(64)) {
         let mut bits = 0;
         for (bit, block) in blocks.iter().enumerate() {
-            bits |= u64::from(registers.is_reached::<N>(simd, block)) << bit;
+            bits |= u64::from(registers.is_reached(simd, block)) << bit;
         }
         *word = bits;
     }
@@ -109,7 +73,7 @@ fn mark<S: ByteDot, const N: usize>(
         && let Some(last) = bytes.last_chunk()
         && let Some(word) = active.get_mut(blocks.len() / 64)
     {
-        *word |= u64::from(registers.is_reached::<N>(simd, last)) << (blocks.len() % 64);
+        *word |= u64::from(registers.is_reached(simd, last)) << (blocks.len() % 64);
     }
 }
 
@@ -122,28 +86,24 @@ struct Registers<S: Simd> {
 
 impl<S: ByteDot> Registers<S> {
     #[inline(always)]
-    fn new<const N: usize>(
-        simd: S,
-        [a, b, c]: &[Weights<N>; 3],
-        level: i16,
-        two_on: &[u8; 64],
-    ) -> Self {
+    fn new(simd: S, dot: &SimdDot) -> Self {
         Self {
-            weights: [load(simd, a), load(simd, b), load(simd, c)],
-            level: S::i16s::splat(simd, level),
-            two_on: S::u8s::from_slice(simd, &two_on[..N]),
+            weights: [load(simd, dot, 0), load(simd, dot, 1), load(simd, dot, 2)],
+            level: S::i16s::splat(simd, dot.level),
+            two_on: S::u8s::from_slice(simd, &dot.two_on[..S::u8s::LEN]),
         }
     }
 
     /// Whether a pixel of a block reaches the level.
     #[inline(always)]
-    fn is_reached<const N: usize>(&self, simd: S, block: &[u8; BYTES]) -> bool {
+    fn is_reached(&self, simd: S, block: &[u8; BYTES]) -> bool {
+        let lanes = S::u8s::LEN;
         let mut largest = S::i16s::splat(simd, i16::MIN);
         let zero = S::u8s::splat(simd, 0);
-        for part in block.chunks_exact(3 * N) {
-            let first = S::u8s::from_slice(simd, &part[..N]);
-            let second = S::u8s::from_slice(simd, &part[N..2 * N]);
-            let third = S::u8s::from_slice(simd, &part[2 * N..]);
+        for part in block.chunks_exact(3 * lanes) {
+            let first = S::u8s::from_slice(simd, &part[..lanes]);
+            let second = S::u8s::from_slice(simd, &part[lanes..2 * lanes]);
+            let third = S::u8s::from_slice(simd, &part[2 * lanes..]);
             // No pixel of these extends beyond the third vector.
             let vectors = [(first, second), (second, third), (third, zero)];
             for ((bytes, next), [here, two_on]) in vectors.into_iter().zip(self.weights) {
@@ -156,16 +116,20 @@ impl<S: ByteDot> Registers<S> {
     }
 }
 
+/// Weights of one of three consecutive vectors.
 #[inline(always)]
-fn load<S: ByteDot, const N: usize>(simd: S, [here, two_on]: &Weights<N>) -> [S::i8s; 2] {
+fn load<S: ByteDot>(simd: S, dot: &SimdDot, vector: usize) -> [S::i8s; 2] {
+    let start = vector * S::i8s::LEN % 6;
+    let [here, two_on] = &dot.weights;
     [
-        S::i8s::from_slice(simd, here),
-        S::i8s::from_slice(simd, two_on),
+        S::i8s::from_slice(simd, &here[start..start + S::i8s::LEN]),
+        S::i8s::from_slice(simd, &two_on[start..start + S::i8s::LEN]),
     ]
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::active_blocks::BLOCK;
     use super::super::levels;
     use super::*;
     use fearless_simd::dispatch;

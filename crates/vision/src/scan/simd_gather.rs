@@ -1,13 +1,10 @@
 //! Projection of pixels of three bytes by byte permutations of 64-byte vectors.
 //!
-//! On other processors, and for the other formats, the compiler's vectorisation of [`Group`](super::Group) is as fast.
+//! On other processors, and for the other formats, the compiler's vectorisation of [`Group`](super::row::Group) is as fast.
 
 use fearless_simd::{i16x32, i32x16, prelude::*, u8x64};
 
-use super::active_blocks::BLOCK;
-
-/// Bytes of a block of pixels.
-const BYTES: usize = 3 * BLOCK;
+use super::active_blocks::{BLOCK, BYTES};
 
 /// Pixels in a vector of 32-bit sums.
 const LANES: usize = 16;
