@@ -4,18 +4,14 @@ macro_rules! flags {
     ($($(#[doc = $doc:literal])+ $flag:ident = $name:literal,)+) => {
         /// A condition that a monitor detected, or that the rig reported.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        #[cfg_attr(
-            feature = "serde",
-            derive(serde::Deserialize),
-            serde(expecting = "the name of a flag")
-        )]
-        pub enum Flag {
-            $($(#[doc = $doc])+ #[cfg_attr(feature = "serde", serde(rename = $name))] $flag,)+
-        }
+        pub enum Flag { $($(#[doc = $doc])+ $flag,)+ }
 
         impl Flag {
             /// Every flag, in the order of its bit in [`Flags`].
             pub const ALL: &[Self] = &[$(Self::$flag,)+];
+
+            #[cfg(feature = "serde")]
+            const NAMES: &[&str] = &[$($name,)+];
 
             /// The name in configuration, reports and logs.
             pub const fn name(self) -> &'static str {
@@ -150,9 +146,29 @@ impl Flags {
 
 #[cfg(feature = "serde")]
 mod deserialize {
-    use super::Flags;
+    use super::{Flag, Flags};
     use core::fmt;
-    use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+    use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+
+    struct Name;
+
+    impl Visitor<'_> for Name {
+        type Value = Flag;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            formatter.write_str("the name of a flag")
+        }
+
+        fn visit_str<E: Error>(self, name: &str) -> Result<Flag, E> {
+            Flag::from_name(name).ok_or_else(|| E::unknown_variant(name, Flag::NAMES))
+        }
+    }
+
+    impl<'de> Deserialize<'de> for Flag {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_str(Name)
+        }
+    }
 
     struct Names;
 
