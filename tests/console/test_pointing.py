@@ -10,9 +10,9 @@ import tautscope
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tautscope.console.lease import ImageTimes, Lease
-from tautscope.console.motion_limits import motion_limits
 from tautscope.console.operator_input import COMMAND_TIMEOUT, RAMP_TIME, OperatorInput
 from tautscope.console.pointing import Pointing
+from tautscope.console.programs import motion_limits
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
 from test_operator_input import CONFIG, PERIOD, SPEED, START, Desk
