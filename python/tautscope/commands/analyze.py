@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from tautscope.commands import analyze_episodes, arguments
 from tautscope.commands.analyze_output import print_columns, print_results, results_to_json
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import load_config
 from tautscope.errors import FieldError, RecordError
 
@@ -107,7 +108,10 @@ def _run(options: argparse.Namespace) -> int:
     if options.command is None and options.measured is None:
         _, sheet = _open(options)
         columns, pairs = list_columns(sheet)
-        print_columns(options.file, columns, pairs, is_json=options.json)
+        proposed = [{"command": command, "measured": tip} for command, tip in pairs]
+        document = {"columns": [asdict(column) for column in columns], "pairs": proposed}
+        print_json(options, document)
+        print_columns(options.file, columns, pairs)
         return 0
     for name in ("command", "measured"):
         if getattr(options, name) is None:
@@ -125,10 +129,8 @@ def _run(options: argparse.Namespace) -> int:
     folder = arguments.out_folder(options)
     results = _results(options, sheet)
     settings = write_results(results, folder)
-    if options.json:
-        print_json({"folder": str(folder), **results_to_json(results, settings)})
-    else:
-        print_results(results, folder)
+    print_json(options, {"folder": str(folder), **results_to_json(results, settings)})
+    print_results(results, folder)
     helps = all(verdict.helps for verdict, _ in results)
     return 0 if helps or not options.check else 1
 
@@ -155,7 +157,6 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
     """Verdict and comparison of models per degree of freedom; the file is read once."""
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
     from tautscope.analysis.verdict import judge  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.runs.columns import time_column  # noqa: PLC0415
     from tautscope.runs.records import read_record  # noqa: PLC0415
     from tautscope.runs.tables import open_table  # noqa: PLC0415

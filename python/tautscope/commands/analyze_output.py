@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import console
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
@@ -15,18 +14,12 @@ if TYPE_CHECKING:
     from tautscope.runs.columns import Column
 
 
-def print_columns(
-    file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]], *, is_json: bool
-) -> None:
+def print_columns(file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]]) -> None:
     """Print the columns with their ranges, and commands to continue with."""
     import shlex  # noqa: PLC0415
 
     from rich.table import Table  # noqa: PLC0415
 
-    if is_json:
-        proposed = [{"command": command, "measured": tip} for command, tip in pairs]
-        print_json({"columns": [asdict(column) for column in columns], "pairs": proposed})
-        return
     table = Table(box=None, pad_edge=False)
     for heading in ("number", "title", "unit", "values", "least", "largest"):
         table.add_column(heading, justify="left" if heading in ("title", "unit") else "right")

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def _bench(options: argparse.Namespace) -> None:
     )
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.drawn is not None:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibrate_camera import add_board_options
 from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits, twin_seed
 from tautscope.commands.printing import print_json
@@ -56,7 +55,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     seed = options.seed = twin_seed(options, config) if options.twin else None
     if not options.twin:
         refuse_wrong_limits(options.config)
@@ -74,10 +73,8 @@ def _run(options: argparse.Namespace) -> int:
             _say(f"Stopped. To resume: tautscope calibrate all --config {options.config}")
             return _INCOMPLETE
     report = session.finish({step.name: step.title for step in STEPS})
-    if options.json:
-        print_json({"folder": str(session.folder), "done": session.state.done})
-    else:
-        print(f"Calibrated: {options.config}. Report: {report}")
+    print_json(options, {"folder": str(session.folder), "done": session.state.done})
+    print(f"Calibrated: {options.config}. Report: {report}")
     return 0
 
 

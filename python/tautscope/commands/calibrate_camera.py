@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
-from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
+from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_twin, twin_seed
+from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ def _run(options: argparse.Namespace) -> None:
 
         board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
-        text = f"Print {options.board} at 100 %, and measure its ruler and squares."
-        finish_file(options, options.board, text)
+        print_json(options, {"file": str(options.board)})
+        print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
         return
     check_options(options)
     if options.ros is not None:
@@ -139,7 +139,7 @@ def calibrate(
 
 
 def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.twin:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 

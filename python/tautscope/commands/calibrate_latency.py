@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments, robot, robot_calibration
 from tautscope.commands.align import NO_ANSWER, print_delay
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import (
     ARTICLE_MOTION,
@@ -82,14 +81,10 @@ def _run(options: argparse.Namespace) -> int:
         return robot_calibration.run_latency(options)
     recording, serial_numbers = _recording(options)
     found = align_recording(recording)
+    print_delay(found)
     if not found.is_known:
-        if options.json:
-            print_json({**found.to_json(), "camera_delay": None})
-        else:
-            print_delay(found)
+        print_json(options, {**found.to_json(), "camera_delay": None})
         return NO_ANSWER
-    if not options.json:
-        print_delay(found)
     finish(options, result(found, recording.config, serial_numbers))
     return 0
 
@@ -144,7 +139,7 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         from tautscope.log.reader import read_log  # noqa: PLC0415
 
         return read_log(options.file).recording(), {}
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if not options.twin:
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"

@@ -60,22 +60,12 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
         write_values(options.config, changes)
     if options.out is not None:
         _write_folder(options.out, result, text)
-    if options.json:
-        print_json(_document(result, changes))
-        return
+    print_json(options, _document(result, changes))
     print(text, end="")
     for note in result.notes:
         print(f"# {note}")
     if options.write:
         print(f"# written: {options.config}")
-
-
-def finish_file(options: argparse.Namespace, file: Path, text: str) -> None:
-    """Print what to do with a file that was written, or its name as JSON."""
-    if options.json:
-        print_json({"file": str(file)})
-    else:
-        print(text)
 
 
 def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:

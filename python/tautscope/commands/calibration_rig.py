@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
+from tautscope.commands.printing import progress_bar
 from tautscope.commands.question import confirm
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
@@ -83,7 +83,7 @@ def rig_for_calibration(
             whether the motors may move is not answered with y.
         TautscopeError: Errors of the rig.
     """
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
         from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
@@ -121,7 +121,6 @@ def run_protocol(
     options: argparse.Namespace, config: Config, folder: Path, title: str
 ) -> tuple[Recording, HardwareRun | None]:
     """Run the sines of a configuration on the rig, which logs them in a folder, or on the twin."""
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.loop.references import SineSequence  # noqa: PLC0415
     from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from tautscope.commands.article_config import article_config
+from tautscope.commands.arguments import article_config
 from tautscope.config import Config, dump_config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError

@@ -27,7 +27,5 @@ def _config(options: argparse.Namespace) -> None:
     from tautscope.config.template import template  # noqa: PLC0415
 
     config = load_config(options.config)
-    if options.json:
-        print_json(to_document(config))
-    else:
-        print(template(config, placeholders(options.config)), end="")
+    print_json(options, to_document(config))
+    print(template(config, placeholders(options.config)), end="")

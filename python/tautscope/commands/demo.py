@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, robot
-from tautscope.commands.article_config import article_config
-from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import announce, console, print_json
+from tautscope.commands.printing import announce, console, print_json, progress_bar
 from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
+from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -80,7 +79,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.report import demo, tables  # noqa: PLC0415
 
     if options.robot is not None:
@@ -106,21 +104,19 @@ def _run(options: argparse.Namespace) -> None:
     with recording_saved(folder), progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
-    if options.json:
-        document = tables.to_json(
-            config.profile,
-            seeds,
-            found.results,
-            found.operator_results,
-            sim_seconds=found.sim_seconds,
-            wall_seconds=found.wall_seconds,
-            article_results=found.article_results,
-        )
-        print_json({"folder": str(folder), **document})
-    else:
-        _print_table1(found)
-        _print_operator_motion(found)
-        _print_facts(found, folder)
+    document = tables.to_json(
+        config.profile,
+        seeds,
+        found.results,
+        found.operator_results,
+        sim_seconds=found.sim_seconds,
+        wall_seconds=found.wall_seconds,
+        article_results=found.article_results,
+    )
+    print_json(options, {"folder": str(folder), **document})
+    _print_table1(found)
+    _print_operator_motion(found)
+    _print_facts(found, folder)
 
 
 def _run_robot(options: argparse.Namespace) -> None:
@@ -135,7 +131,7 @@ def _run_robot(options: argparse.Namespace) -> None:
 
 
 def _load(options: argparse.Namespace) -> Config:
-    config = article_config(options.config, options.profile)
+    config = arguments.article_config(options.config, options.profile)
     changes: dict[str, Any] = {}
     if options.seed is not None:
         changes["twin.seed"] = options.seed

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.commands.rig_choice import add_rig, choose_rig
@@ -136,7 +135,7 @@ def _doctor(options: argparse.Namespace) -> int:
     if options.rig is None and options.yes:
         raise FieldError("--yes", True, "--rig: without it nothing moves")
     if options.rig is None:
-        config = article_config(options.config)
+        config = arguments.article_config(options.config)
         checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
     else:
         checks = _check_own(options, *choose_rig(options))
@@ -145,14 +144,12 @@ def _doctor(options: argparse.Namespace) -> int:
     with exit_on_signals():
         for found in itertools.chain(_check_placeholders(marked), checks):
             findings.append(found)
-            if not options.json:
-                _print(found)
+            _print(found)
     missing = sum(found.status == "missing" for found in findings)
-    if options.json:
-        print_json({"complete": not missing, "findings": [found.to_json() for found in findings]})
-    else:
-        result = f"{missing} missing." if missing else "All there."
-        print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
+    shown = [found.to_json() for found in findings]
+    print_json(options, {"complete": not missing, "findings": shown})
+    result = f"{missing} missing." if missing else "All there."
+    print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
     return 1 if missing else 0
 
 

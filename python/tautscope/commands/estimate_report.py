@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -18,39 +19,29 @@ from tautscope.runs.recording import Recording
 
 
 def write_estimates(
+    options: argparse.Namespace,
     folder: Path,
     replayed: Recording,
     recorded: Recording | None,
-    *,
-    as_json: bool,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
     """Write the folder of a replay, and print its estimates beside the recorded ones.
 
     Args:
+        options: Of the command.
         folder: The new folder.
         replayed: The estimates.
         recorded: Those of the run, if there was one.
-        as_json: Whether to print JSON.
         facts: Further entries of the JSON object.
     """
     write_replay(folder, replayed, recorded)
     after = estimation_quality(replayed, recorded)
     before = None if recorded is None else estimation_quality(recorded)
-    if as_json:
-        document: dict[str, Any] = {
-            "folder": str(folder),
-            "images": len(replayed.frames),
-            **facts,
-            "dof": {},
-        }
-        for label, figures in after.items():
-            entry = {"replayed": _finite(figures)}
-            if before is not None:
-                entry["recorded"] = _finite(before[label])
-            document["dof"][label] = entry
-        print_json(document)
-        return
+    dofs = {label: {"replayed": _finite(figures)} for label, figures in after.items()}
+    for label, figures in (before or {}).items():
+        dofs[label]["recorded"] = _finite(figures)
+    images = len(replayed.frames)
+    print_json(options, {"folder": str(folder), "images": images, **facts, "dof": dofs})
     _print_table(replayed, before, after)
     print(f"\nFigure and data: {folder / 'replay.png'}")
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.config import Config
 from tautscope.errors import FieldError
 
@@ -51,7 +50,7 @@ def read_motion(
     from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.runs.records import read_motors  # noqa: PLC0415
 
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     recorder = make(config)
     times, positions = read_motors(options.motors)
     for time, position in zip(times, positions, strict=True):
@@ -69,7 +68,7 @@ def _read_log(
     from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(file)
-    config = log.config if options.config is None else article_config(options.config)
+    config = log.config if options.config is None else arguments.article_config(options.config)
     config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
     recorder = make(config)
     captured = (FRAME_COLUMNS.names or ()).index("captured_at")

@@ -49,7 +49,6 @@ def _run(options: argparse.Namespace) -> None:
     }
     with new_folder(folder) as place:
         write_report(stored.run, place, facts)
-    if options.json:
-        print_json({"folder": str(folder), "source": str(stored.source), **stored.run.summary()})
-        return
+    document = {"folder": str(folder), "source": str(stored.source), **stored.run.summary()}
+    print_json(options, document)
     print_results(stored.run, folder)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from tautscope.commands.article_config import article_config
+from tautscope.commands.arguments import article_config
 from tautscope.config import Config, Profile, load_config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import ConfigError, FieldError

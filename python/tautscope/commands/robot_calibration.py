@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_yes, confirm_motion
+from tautscope.commands.printing import progress_bar
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
 from tautscope.config import Config
@@ -72,7 +73,6 @@ def run_latency(options: argparse.Namespace) -> int:
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
     from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     config, make = choose_rig(options)
     if not config.dof:

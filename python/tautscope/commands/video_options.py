@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tautscope.commands import arguments
 from tautscope.commands.positions import add_units, read_positions
+from tautscope.commands.printing import progress_bar
 from tautscope.config import Config
 from tautscope.errors import FieldError
 
@@ -62,7 +63,6 @@ def align_video_options(
     Returns:
         The estimate, and the stamps of the frames (m,) [s].
     """
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.log.alignment import align_video  # noqa: PLC0415
 
