@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import console, print_json, progress_bar
+from tautscope.runs.episodes import Episode
 from tautscope.runs.output_folder import new_folder
 
 if TYPE_CHECKING:
     from tautscope.analysis.episodes import Summary
-    from tautscope.runs.episodes import Episode
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands.printing import console
+from tautscope.runs.columns import Column
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
     from tautscope.analysis.verdict import Verdict
-    from tautscope.runs.columns import Column
 
 
 def print_columns(file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]]) -> None:

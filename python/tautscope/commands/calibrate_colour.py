@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
@@ -16,7 +17,6 @@ from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.calibration.bands.labels import LabelledImage
-    from tautscope.calibration.result import CalibrationResult
 
 
 def add_parser(kinds: arguments.Verbs) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tautscope.calibration.geometry import GeometryFit, Recording
-    from tautscope.calibration.result import CalibrationResult
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -127,8 +127,6 @@ def result(
     found: GeometryFit, serial_numbers: Mapping[str, str], *, with_figures: bool = True
 ) -> CalibrationResult:
     """The result in the form that all calibrations have; an error if it is not plausible."""
-    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
-
     if not found.is_plausible:
         raise RecordError(
             "recording", "; ".join(found.warnings), "a record that the model explains"

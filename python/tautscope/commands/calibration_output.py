@@ -6,15 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config.edit import edited_text, writable_file, write_values
 from tautscope.errors import FieldError
+from tautscope.runs.output_folder import check_free, check_writable, new_folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from tautscope.calibration.result import CalibrationResult
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,8 +42,6 @@ def check_options(options: argparse.Namespace) -> None:
         FieldError: ``--write`` without ``--config``.
         OutputError: The folder is taken or cannot be written.
     """
-    from tautscope.runs.output_folder import check_free, check_writable  # noqa: PLC0415
-
     if options.write:
         if options.config is None:
             raise FieldError("--write", True, "also --config FILE, the file to write to")
@@ -69,8 +67,6 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
 
 
 def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
-    from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
-
     with new_folder(folder) as partial:
         (partial / "values.toml").write_text(text, encoding="utf-8")
         for k, (figure, _) in enumerate(result.figures):

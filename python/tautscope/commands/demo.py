@@ -13,6 +13,7 @@ from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
+from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
 from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
-    from tautscope.report.rows import Row
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
@@ -174,7 +174,6 @@ def _cell(
 
 def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import ROWS  # noqa: PLC0415
 
     profiles = demo.by_profile
     several = len(demo.seeds) > 1
@@ -199,7 +198,6 @@ def _print_table1(demo: Demo) -> None:
 
 def _print_operator_motion(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import OPERATOR_ROWS  # noqa: PLC0415
 
     results = demo.operator_results
     several = len(results) > 1

@@ -14,13 +14,16 @@ from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import missing_modules
+from tautscope.hardware.doctor.calibration import check_calibration
+from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.doctor.rig import check_rig
+from tautscope.hardware.signals import exit_on_signals
+from tautscope.loop.rig import Rig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from tautscope.config import Config
-    from tautscope.hardware.doctor.check_result import CheckResult
-    from tautscope.loop.rig import Rig
 
 QUESTION = (
     "The rig will be reset, WHICH MAY MOVE ITS MOTORS to their start, and held there for 3 s. "
@@ -58,7 +61,6 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         folder: Folder for recordings.
     """
     from tautscope.hardware.doctor import camera, computer, drives  # noqa: PLC0415
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
 
     yield from computer.check_computer(config)
     yield computer.check_disk(config, folder)
@@ -66,7 +68,6 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield drives.check_interfaces(needed=not is_rig)
     if missing_modules("hardware"):
         return
-    from tautscope.hardware.doctor.calibration import check_calibration  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
 
     if not is_rig:
@@ -104,9 +105,6 @@ def _check_own(
     Raises:
         ConfigError: There is no such rig, or the configuration has no [[dof]].
     """
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
-    from tautscope.hardware.doctor.rig import check_rig  # noqa: PLC0415
-
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
     if config.drives is not None:
@@ -130,8 +128,6 @@ def _check_own(
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
-
     if options.rig is None and options.yes:
         raise FieldError("--yes", True, "--rig: without it nothing moves")
     if options.rig is None:
@@ -154,8 +150,6 @@ def _doctor(options: argparse.Namespace) -> int:
 
 
 def _check_placeholders(marked: Sequence[str]) -> Iterator[CheckResult]:
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
-
     if marked:
         todo = f"Replace each value, then delete the word {MARK} beside it"
         found = f"not replaced: {', '.join(marked)}"

@@ -14,6 +14,7 @@ from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.run_protocol import add_protocol, apply_protocol, write_environment
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError
+from tautscope.hardware.doctor.computer import bytes_per_second
 from tautscope.loop.references import SineSequence
 from tautscope.runs.output_folder import recording_saved
 
@@ -60,7 +61,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.hardware.doctor.computer import bytes_per_second  # noqa: PLC0415
     from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 

@@ -19,6 +19,8 @@ from tautscope.commands.video_options import (
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 from tautscope.extras import require_extras
+from tautscope.hardware.video import read_video
+from tautscope.log.comparison import write_replay
 from tautscope.runs.output_folder import check_free
 
 if TYPE_CHECKING:
@@ -158,7 +160,6 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _replay_same(options: argparse.Namespace, log: Log) -> int:
-    from tautscope.log.comparison import write_replay  # noqa: PLC0415
     from tautscope.log.replay import replay_same  # noqa: PLC0415
 
     if options.out is not None:
@@ -202,7 +203,6 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
 
 def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.commands.estimate_report import write_estimates  # noqa: PLC0415
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.log.alignment import implausible_motors  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_video, retimed  # noqa: PLC0415
 

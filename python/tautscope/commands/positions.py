@@ -11,6 +11,8 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError, RecordError
 from tautscope.loop.references import RecordedReference
+from tautscope.runs.records import read_motors
+from tautscope.runs.units import parse_units
 
 Floats = NDArray[np.float64]
 
@@ -42,9 +44,6 @@ def add_reference(parser: argparse.ArgumentParser, replaces: str) -> None:
 
 def read_positions(path: str, units: str, config: Config) -> tuple[Floats, Floats]:
     """Time (n,) [s] and positions (n, 3) [m, rad, rad], see `read_motors`."""
-    from tautscope.runs.records import read_motors  # noqa: PLC0415  Polars
-    from tautscope.runs.units import parse_units  # noqa: PLC0415
-
     sines = [config.experiment[dof] for dof in Dof]
     largest = [LARGEST_WORKSPACES * (abs(sine.centre) + sine.amplitude) for sine in sines]
     return read_motors(path, parse_units(units), np.array(largest))

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, TypeVar
 from tautscope.commands import arguments
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.hardware.video import read_video
+from tautscope.runs.recording import FRAME_COLUMNS
+from tautscope.runs.records import read_motors
 
 if TYPE_CHECKING:
     from tautscope.calibration.motion import ImageRecorder
@@ -47,9 +50,6 @@ def read_motion(
         return _read_log(options, file, make)
     if options.motors is None:
         raise FieldError("file", str(file), allowed)
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
-    from tautscope.runs.records import read_motors  # noqa: PLC0415
-
     config = arguments.article_config(options.config)
     recorder = make(config)
     times, positions = read_motors(options.motors)
@@ -65,7 +65,6 @@ def _read_log(
     options: argparse.Namespace, file: Path, make: Callable[[Config], Recorder]
 ) -> tuple[Recorder, Config]:
     from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
-    from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(file)
     config = log.config if options.config is None else arguments.article_config(options.config)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from tautscope.commands.arguments import article_config
 from tautscope.config import Config, Profile, load_config
 from tautscope.config.placeholders import refuse_placeholders
+from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import ConfigError, FieldError
 from tautscope.loop.rig import Rig
 from tautscope.runs.rigs import rig_maker
@@ -57,8 +58,6 @@ def choose_rig(
     config = load_config(options.config or robot, profile)
     if not in_real_time:
         return config, make
-    from tautscope.console.paced_rig import PacedRig  # noqa: PLC0415
-
     period = config.control.period
     return config, lambda used: PacedRig(lambda: make(used), period, is_simulated=bool(is_twin))
 

@@ -10,6 +10,7 @@ from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in
 from tautscope.config import load_config
 from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
+from tautscope.ros2.inputs import JoyAxes
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -87,7 +88,6 @@ def _ros2(options: argparse.Namespace) -> int:
     if not (options.driver or options.rig):
         require_extras("tautscope ros2", ["twin" if options.twin else "hardware"])
     from tautscope.hardware.realtime import OTHERS, realtime  # noqa: PLC0415
-    from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
 

@@ -7,14 +7,12 @@ import datetime
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.doctor.computer import check_computer
 from tautscope.log.header import software_versions
-
-if TYPE_CHECKING:
-    from tautscope.hardware.doctor.check_result import CheckResult
 
 BENDS = (0, 90, 180, 360)
 """Bends of the desktop rig's channel [degrees]."""
@@ -83,8 +81,6 @@ def write_environment(options: argparse.Namespace, config: Config, folder: Path)
         config: Of the run.
         folder: That of the run.
     """
-    from tautscope.hardware.doctor.computer import check_computer  # noqa: PLC0415
-
     facts = {
         "protocol": options.protocol,
         "bend": options.bend,

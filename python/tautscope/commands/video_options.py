@@ -14,6 +14,7 @@ from tautscope.commands.positions import add_units, read_positions
 from tautscope.commands.printing import progress_bar
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.hardware.video import read_video
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -63,7 +64,6 @@ def align_video_options(
     Returns:
         The estimate, and the stamps of the frames (m,) [s].
     """
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.log.alignment import align_video  # noqa: PLC0415
 
     start = float(motors[0][0]) if options.video_start is None else options.video_start
