@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,6 @@ from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof, NamedDof
 from tautscope.errors import MissingPathError, RecordError
 from tautscope.loop.references import Segment
-from tautscope.runs.csv_files import read_csv, write_csv
 from tautscope.runs.output_folder import new_folder
 
 Floats = NDArray[np.float64]
@@ -162,8 +162,8 @@ class Recording:
         """Write the files of `save` into an existing folder, with a suffix to their names."""
         import tomlkit  # noqa: PLC0415  only writing needs it
 
-        write_csv(folder / f"trace{suffix}.csv", self.trace)
-        write_csv(folder / f"frames{suffix}.csv", self.frames)
+        _write_csv(folder / f"trace{suffix}.csv", self.trace)
+        _write_csv(folder / f"frames{suffix}.csv", self.frames)
         facts = tomlkit.dumps(run_facts(self.compensated, self.segments))
         (folder / f"recording{suffix}.toml").write_text(facts, encoding="utf-8")
         (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
@@ -188,8 +188,8 @@ class Recording:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
         return cls(
-            trace=read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
-            frames=read_csv(place / f"frames{suffix}.csv", update_columns(config)),
+            trace=_read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
+            frames=_read_csv(place / f"frames{suffix}.csv", update_columns(config)),
             config=config,
             compensated=compensated,
             segments=segments,
@@ -234,3 +234,36 @@ def _between(
     time: Floats, start: float, segment: Segment, first: float, last: float
 ) -> NDArray[np.bool_]:
     return (time >= start + first * segment.period) & (time <= start + last * segment.period)
+
+
+def _write_csv(path: Path, table: Table) -> None:
+    """Write a structured array as CSV with a header; every number is written in full."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table.dtype.names or ())
+        writer.writerows(table.tolist())
+
+
+def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
+    """Read a file of `_write_csv`; equal to what was written, to the last bit.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        RecordError: A column or a cell is not as `_write_csv` writes it.
+    """
+    if not path.is_file():
+        raise MissingPathError("recording", str(path), "a file of a saved recording")
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    names = dtype.names or ()
+    if tuple(header) != names:
+        raise RecordError(str(path), ",".join(header), f"the columns {', '.join(names)}")
+    table = np.empty(len(rows), dtype)
+    try:
+        columns = list(zip(*rows, strict=True)) or [()] * len(names)
+        for name, column in zip(names, columns, strict=True):
+            is_flag = dtype[name].kind == "b"
+            table[name] = [cell == "True" for cell in column] if is_flag else column
+    except ValueError as error:
+        raise RecordError(str(path), str(error), "a number in every cell") from None
+    return table
