@@ -6,12 +6,12 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
+from tautscope.commands.positions import read_positions
 from tautscope.commands.printing import print_json
 from tautscope.commands.video_options import (
     add_video_options,
     align_video_options,
     check_video_options,
-    read_motor_options,
 )
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _run(options: argparse.Namespace) -> int:
         remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
     else:
         config = arguments.article_config(options.config)
-        motors = read_motor_options(options, config)
+        motors = read_positions(options.motors, options.units, config)
         found, stamps = align_video_options(options, config, motors, limit=options.within)
         start = float(stamps[0]) - found.delay
         document["video_start"] = start if found.is_known else None

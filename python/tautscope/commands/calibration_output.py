@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
@@ -14,7 +14,7 @@ from tautscope.errors import FieldError
 from tautscope.runs.output_folder import check_free, check_writable, new_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    pass
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -57,24 +57,17 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
     if options.write:
         write_values(options.config, changes)
     if options.out is not None:
-        _write_folder(options.out, result, text)
-    print_json(options, _document(result, changes))
+        with new_folder(options.out) as partial:
+            (partial / "values.toml").write_text(text, encoding="utf-8")
+            for k, (figure, _) in enumerate(result.figures, 1):
+                number = f"_{k}" if len(result.figures) > 1 else ""
+                figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
+    values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
+    record = changes[f"calibration.{result.kind}"]
+    notes = list(result.notes)
+    print_json(options, {"values": values, **record, **result.data, "notes": notes})
     print(text, end="")
     for note in result.notes:
         print(f"# {note}")
     if options.write:
         print(f"# written: {options.config}")
-
-
-def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
-    with new_folder(folder) as partial:
-        (partial / "values.toml").write_text(text, encoding="utf-8")
-        for k, (figure, _) in enumerate(result.figures):
-            number = f"_{k + 1}" if len(result.figures) > 1 else ""
-            figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
-
-
-def _document(result: CalibrationResult, changes: Mapping[str, Any]) -> dict[str, Any]:
-    values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
-    record = changes[f"calibration.{result.kind}"]
-    return {"values": values, **record, **result.data, "notes": list(result.notes)}

@@ -21,7 +21,7 @@ from tautscope.hardware.signals import exit_on_signals
 from tautscope.loop.rig import Rig
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from tautscope.config import Config
 
@@ -138,7 +138,13 @@ def _doctor(options: argparse.Namespace) -> int:
     marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():
-        for found in itertools.chain(_check_placeholders(marked), checks):
+        if marked:
+            todo = f"Replace each value, then delete the word {MARK} beside it"
+            what = f"not replaced: {', '.join(marked)}"
+            checks = itertools.chain(
+                [CheckResult("configuration", "placeholders", "missing", what, todo)], checks
+            )
+        for found in checks:
             findings.append(found)
             _print(found)
     missing = sum(found.status == "missing" for found in findings)
@@ -147,13 +153,6 @@ def _doctor(options: argparse.Namespace) -> int:
     result = f"{missing} missing." if missing else "All there."
     print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
     return 1 if missing else 0
-
-
-def _check_placeholders(marked: Sequence[str]) -> Iterator[CheckResult]:
-    if marked:
-        todo = f"Replace each value, then delete the word {MARK} beside it"
-        found = f"not replaced: {', '.join(marked)}"
-        yield CheckResult("configuration", "placeholders", "missing", found, todo)
 
 
 def _print(found: CheckResult) -> None:

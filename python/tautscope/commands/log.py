@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
+from tautscope.commands.positions import read_positions
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.commands.video_options import (
     add_video_options,
     align_video_options,
     check_video_options,
-    read_motor_options,
 )
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
@@ -208,7 +208,7 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
 
     config: Config = arguments.article_config(options.config, options.profile)
     folder = arguments.out_folder(options)
-    motors = read_motor_options(options, config)
+    motors = read_positions(options.motors, options.units, config)
     found, stamps = align_video_options(options, config, motors)
     for note in implausible_motors(found):
         _LOG.warning("%s", note)

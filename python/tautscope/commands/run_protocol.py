@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
-from collections.abc import Iterable
 from pathlib import Path
 
 from tautscope.config import Config
 from tautscope.errors import FieldError
-from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.doctor.computer import check_computer
 from tautscope.log.header import software_versions
 
@@ -86,12 +84,8 @@ def write_environment(options: argparse.Namespace, config: Config, folder: Path)
         "bend": options.bend,
         "recorded": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
-        "computer": _found(check_computer(config)),
+        "computer": {check.what: check.found for check in check_computer(config)},
     }
     (folder / ENVIRONMENT).write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     text = _ABOUT.format(environment=ENVIRONMENT)
     (folder / "README.txt").write_text(text, encoding="utf-8")
-
-
-def _found(checks: Iterable[CheckResult]) -> dict[str, str]:
-    return {check.what: check.found for check in checks}

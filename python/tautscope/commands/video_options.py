@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.commands import arguments
-from tautscope.commands.positions import add_units, read_positions
+from tautscope.commands.positions import add_units
 from tautscope.commands.printing import progress_bar
 from tautscope.config import Config
 from tautscope.errors import FieldError
@@ -47,11 +47,6 @@ def check_video_options(options: argparse.Namespace) -> None:
         raise FieldError(options.verb, given, "a log, or --video with --motors")
     if (options.video is None) != (options.motors is None):
         raise FieldError("--motors", options.motors, "a file of motor positions and --video")
-
-
-def read_motor_options(options: argparse.Namespace, config: Config) -> tuple[Floats, Floats]:
-    """Time [s] and motor positions [m, rad, rad] of ``--motors``, see `read_motors`."""
-    return read_positions(options.motors, options.units, config)
 
 
 def align_video_options(

@@ -110,15 +110,14 @@ class Sensors:
                 or the orientation no rotation; the kinematics has no tip, or no points.
         """
         settings, given = self._config.measurement, measurement.covariance
-        allowed = "numbers or NaN, not all NaN"
         if isinstance(measurement, Tip):
-            values = check_numbers("values", measurement.values, (self._count,), allowed)
+            values = check_numbers("values", measurement.values, (self._count,))
             identity = np.eye(self._count)
             covariance = _covariance(given, settings.tip_deviation * self._widths)
             return Reading(values, covariance, lambda q: (q, identity), np.copy)
         if isinstance(measurement, Pose):
             kinematics = self._with("tip", "on_pose")
-            place = check_numbers("position", measurement.position, (3,), allowed)
+            place = check_numbers("position", measurement.position, (3,))
             std = np.full(3, settings.position_deviation)
             if measurement.orientation is None:
                 return self.own(place, _covariance(given, std), lambda q: kinematics.tip(q)[0])
@@ -134,7 +133,7 @@ class Sensors:
         points: Any = self._with("points", "on_points")
         rows = np.atleast_1d(np.asarray(measurement.pixels, dtype=object))
         shape = min(max(len(rows), 1), MOST_VALUES // 2), 2
-        found = check_numbers("pixels", measurement.pixels, shape, allowed).ravel()
+        found = check_numbers("pixels", measurement.pixels, shape).ravel()
         covariance = _covariance(given, np.full(found.size, settings.point_deviation))
         return self.own(found, covariance, lambda q: np.ravel(points.points(q)), point=2)
 

@@ -203,7 +203,7 @@ class MarkerDetector:
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
             self._layout.checked(image), self._prior(predicted, expectation)
         )
-        a, b = (BandScore(*row[:8], centroid=(row[8], row[9])) for row in scores.tolist())
+        a, b = (BandScore(*row, (u, v)) for *row, u, v in scores.tolist())
         found = tuple(map(Region._make, regions))
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 

@@ -140,14 +140,17 @@ class Recording:
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
-        return _between(self.trace["time"], self._start_of(segment), segment, first, last)
+        return self._between(self.trace["time"], segment, first, last)
 
     def frames_during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(frames,) frames captured in periods `first` to `last` of a segment."""
-        return _between(self.frames["captured_at"], self._start_of(segment), segment, first, last)
+        return self._between(self.frames["captured_at"], segment, first, last)
 
-    def _start_of(self, segment: Segment) -> float:
-        return float(self.trace["time"][0]) + segment.start
+    def _between(
+        self, time: Floats, segment: Segment, first: float, last: float
+    ) -> NDArray[np.bool_]:
+        start = float(self.trace["time"][0]) + segment.start
+        return (time >= start + first * segment.period) & (time <= start + last * segment.period)
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml.
@@ -228,12 +231,6 @@ def per_dof(table: Table, group: str, dofs: Iterable[NamedDof] = Dof) -> Floats:
 def per_feature(table: Table, group: str) -> Floats:
     """(n, 4) columns ``<group>_a_x`` to ``<group>_b_y`` of a table [px]."""
     return np.stack([table[f"{group}_{name}"] for name in FEATURES], axis=1)
-
-
-def _between(
-    time: Floats, start: float, segment: Segment, first: float, last: float
-) -> NDArray[np.bool_]:
-    return (time >= start + first * segment.period) & (time <= start + last * segment.period)
 
 
 def _write_csv(path: Path, table: Table) -> None:
