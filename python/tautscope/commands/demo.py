@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, robot
-from tautscope.commands.printing import announce, console, print_json, progress_bar
+from tautscope.commands.printing import (
+    announce,
+    console,
+    print_json,
+    print_table,
+    progress_bar,
+)
 from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
@@ -17,8 +23,6 @@ from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
 from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
 
@@ -146,15 +150,8 @@ def _load(options: argparse.Namespace) -> Config:
     return config
 
 
-def _table(title: str, seeds: int) -> Table:
-    """An empty table of figures of a number of seeds."""
-    from rich.table import Table  # noqa: PLC0415
-
-    if seeds > 1:
-        title += f" (median of {seeds} seeds, worst in brackets)"
-    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
-    table.add_column("", no_wrap=True)
-    return table
+def _title(text: str, seeds: int) -> str:
+    return f"{text} (median of {seeds} seeds, worst in brackets)" if seeds > 1 else text
 
 
 def _cell(
@@ -175,25 +172,21 @@ def _cell(
 def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
 
-    profiles = demo.by_profile
+    profiles, dofs = demo.by_profile, list(demo.results[0])
     several = len(demo.seeds) > 1
     figures = [(tables.median(results), tables.worst(results)) for results in profiles.values()]
-    table = _table("Table 1: the article, and the twin", len(demo.seeds))
-    for dof in demo.results[0]:
-        table.add_column(
-            f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
-        )
-        for name in profiles:
-            table.add_column(f"\n{name}", justify="right")
+    headings, rows = [""], []
+    for dof in dofs:
+        headings += [f"{tables.heading(dof)}\narticle", *(f"\n{name}" for name in profiles)]
     for row in ROWS:
         cells = []
-        for dof in demo.results[0]:
+        for dof in dofs:
             cells.append(tables.article_cell(row, dof))
             cells += [_cell(row, dof, *each, several=several) for each in figures]
-        table.add_row(row.title, *cells)
-    screen = console()
-    screen.print(table)
-    screen.print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
+        rows.append([row.title, *cells])
+    title = _title("Table 1: the article, and the twin", len(demo.seeds))
+    print_table(headings, rows, title=title, dim=range(1, len(headings), len(profiles) + 1))
+    print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
 
 
 def _print_operator_motion(demo: Demo) -> None:
@@ -201,17 +194,15 @@ def _print_operator_motion(demo: Demo) -> None:
 
     results = demo.operator_results
     several = len(results) > 1
-    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
-    table = _table(title, len(results))
     middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
-    for dof in middle:
-        table.add_column(tables.heading(dof), justify="right", no_wrap=True)
-    for row in OPERATOR_ROWS:
-        cells = [_cell(row, dof, middle, bad, several=several) for dof in middle]
-        table.add_row(row.title, *cells)
-    screen = console()
-    screen.print(table)
-    screen.print("Errors of the true tip, after the first 40 s.\n")
+    rows = [
+        [row.title, *(_cell(row, dof, middle, bad, several=several) for dof in middle)]
+        for row in OPERATOR_ROWS
+    ]
+    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
+    headings = ["", *map(tables.heading, middle)]
+    print_table(headings, rows, title=_title(title, len(results)))
+    print("Errors of the true tip, after the first 40 s.\n")
 
 
 def _print_facts(demo: Demo, folder: Path) -> None:

@@ -10,9 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from rich.table import Table
-
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import print_json, print_table
 from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.recording import Recording
@@ -52,15 +50,12 @@ def _print_table(
     after: dict[str, EstimationQuality],
 ) -> None:
     noun = "measurements" if replayed.config.dof else "images"
-    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = f"Estimates from {len(replayed.frames)} {noun}"
-    table.add_column("", no_wrap=True)
     dofs = replayed.config.dofs
+    headings = [""]
     for dof in dofs:
         unit = f"{dof.label} [{dof.display_unit}]"
-        if before is not None:
-            table.add_column(f"{unit}\nrecorded", justify="right", style="dim", no_wrap=True)
-        table.add_column("\nreplayed" if before else unit, justify="right", no_wrap=True)
+        headings += [f"{unit}\nrecorded", "\nreplayed"] if before else [unit]
+    rows = []
     for title, name in (
         ("backlash width at the end", "width"),
         (f"{noun} with the DOF observable", "seen"),
@@ -72,8 +67,9 @@ def _print_table(
             pair = [each[dof.label] for each in (before, after) if each is not None]
             cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
         if any(cells):
-            table.add_row(title, *cells)
-    console().print(table)
+            rows.append([title, *cells])
+    title = f"Estimates from {len(replayed.frames)} {noun}"
+    print_table(headings, rows, title=title, dim=range(1, len(headings), 2) if before else ())
 
 
 def _cell(value: float, name: str, scale: float) -> str:

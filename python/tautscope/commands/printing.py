@@ -6,10 +6,10 @@ import argparse
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tautscope.errors import OutputError
 
@@ -55,6 +55,26 @@ def console() -> Console:
 
     width = None if sys.stdout.isatty() else 200
     return Console(highlight=False, markup=False, width=width)
+
+
+def print_table(
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    title: str | None = None,
+    left: Container[int] = (0,),
+    dim: Container[int] = (),
+) -> None:
+    """Print a table: columns to the right, but for those in `left`; those in `dim` are dimmed."""
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(title=title, box=None, pad_edge=False, title_justify="left", title_style="bold")
+    for k, heading in enumerate(headings):
+        side: Literal["left", "right"] = "left" if k in left else "right"
+        table.add_column(heading, justify=side, style="dim" if k in dim else None, no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    console().print(table)
 
 
 @contextmanager

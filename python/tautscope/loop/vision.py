@@ -203,7 +203,7 @@ class MarkerDetector:
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
             self._layout.checked(image), self._prior(predicted, expectation)
         )
-        a, b = (BandScore(*row, (u, v)) for *row, u, v in scores.tolist())
+        a, b = (_band_score(row) for row in scores.tolist())
         found = tuple(map(Region._make, regions))
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
@@ -291,3 +291,10 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
     if features.shape != (4,):
         raise FieldError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")
     return features
+
+
+def _band_score(row: list[float]) -> BandScore:
+    inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, u, v = row
+    return BandScore(
+        inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, (u, v)
+    )
