@@ -62,7 +62,7 @@ CONTROLS = {
         "python/tautscope/console/server.py",
         "python/tautscope/ros2/session.py",
     ],
-    "N2": ["python/tautscope/console/access.py", "python/tautscope/console/pages.py"],
+    "N2": ["python/tautscope/console/server.py", "python/tautscope/console/pages.py"],
     "N3": [
         "python/tautscope/console/operator_input.py",
         "python/tautscope/ros2/references.py",

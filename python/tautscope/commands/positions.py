@@ -66,18 +66,11 @@ def read_reference(options: argparse.Namespace, config: Config) -> RecordedRefer
     if len(time) < 2:
         raise RecordError(str(options.reference), f"{len(time)} line", "at least 2")
     if config.drives is not None:
-        _check_travel(options.reference, positions, config)
+        for dof in Dof:
+            lower, upper = config.drives[dof].travel
+            farthest = max(positions[:, dof], key=lambda each: max(lower - each, each - upper))
+            if not lower <= farthest <= upper:
+                where = f"{options.reference}, column {dof.label}"
+                allowed = f"{lower:g} to {upper:g}, drives.{dof.label}.travel"
+                raise RecordError(where, float(farthest), allowed)
     return RecordedReference(time, positions, config)
-
-
-def _check_travel(path: str, positions: Floats, config: Config) -> None:
-    assert config.drives is not None
-    for dof in Dof:
-        lower, upper = config.drives[dof].travel
-        farthest = max(positions[:, dof], key=lambda value: max(lower - value, value - upper))
-        if not lower <= farthest <= upper:
-            raise RecordError(
-                f"{path}, column {dof.label}",
-                float(farthest),
-                f"{lower:g} to {upper:g}, drives.{dof.label}.travel",
-            )

@@ -11,7 +11,6 @@ from tautscope.commands import arguments
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.hardware.video import read_video
-from tautscope.runs.recording import FRAME_COLUMNS
 from tautscope.runs.records import read_motors
 
 if TYPE_CHECKING:
@@ -70,7 +69,7 @@ def _read_log(
     config = log.config if options.config is None else arguments.article_config(options.config)
     config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
     recorder = make(config)
-    captured = (FRAME_COLUMNS.names or ()).index("captured_at")
+    captured = log.update_names.index("captured_at")
     for index, event in log.events.items():
         if isinstance(event, Tick):
             recorder.add_tick(event.sample.time, event.sample.applied)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -37,27 +37,18 @@ def trace_columns(dofs: Iterable[NamedDof]) -> np.dtype[np.void]:
     return np.dtype([("time", "f8"), *((name, "f8") for name in names), ("status", "U16")])
 
 
-def frame_columns(
-    dofs: Iterable[NamedDof], features: Sequence[str] = FEATURES
-) -> np.dtype[np.void]:
-    """Columns of the updates of a run with these degrees of freedom and features."""
-    labels = [dof.label for dof in dofs]
+def update_columns(config: Config) -> np.dtype[np.void]:
+    """Columns of the updates of a run: of a robot with [[dof]] without features."""
+    labels = [dof.label for dof in config.dofs]
+    features = [] if config.dof else list(FEATURES)
     groups = ["features", "predicted_features", "innovation", "true_features"]
     return np.dtype(
         [("captured_at", "f8"), ("arrived_at", "f8"), ("sequence", "i8")]
         + [("status", "U16"), ("valid", "?")]
         + [(name, "f8") for name in _names(["estimate", "predicted", "true"], labels)]
         + [(name, "?") for name in _names(["observable"], labels)]
-        + [(name, "f8") for name in _names(groups, list(features))]
+        + [(name, "f8") for name in _names(groups, features)]
     )
-
-
-def update_columns(config: Config) -> np.dtype[np.void]:
-    """Columns of the updates of a run: of a robot with [[dof]] without features."""
-    return frame_columns(config.dofs, () if config.dof else FEATURES)
-
-
-FRAME_COLUMNS = frame_columns(Dof)
 
 
 @dataclass(frozen=True, eq=False)
