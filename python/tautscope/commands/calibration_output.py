@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
@@ -12,9 +11,6 @@ from tautscope.commands.printing import print_json
 from tautscope.config.edit import edited_text, writable_file, write_values
 from tautscope.errors import FieldError
 from tautscope.runs.output_folder import check_free, check_writable, new_folder
-
-if TYPE_CHECKING:
-    pass
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.commands.rig_choice import add_rig, choose_rig
+from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import missing_modules
@@ -19,11 +20,6 @@ from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.doctor.rig import check_rig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.loop.rig import Rig
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from tautscope.config import Config
 
 QUESTION = (
     "The rig will be reset, WHICH MAY MOVE ITS MOTORS to their start, and held there for 3 s. "
