@@ -6,13 +6,13 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.positions import read_positions
-from tautscope.commands.printing import print_json
-from tautscope.commands.video_options import (
+from tautscope.commands.positions import (
     add_video_options,
     align_video_options,
     check_video_options,
+    read_positions,
 )
+from tautscope.commands.printing import print_json
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate, Probe

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.positions import read_positions
-from tautscope.commands.printing import print_json, progress_bar
-from tautscope.commands.video_options import (
+from tautscope.commands.positions import (
     add_video_options,
     align_video_options,
     check_video_options,
+    read_positions,
 )
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 from tautscope.extras import require_extras
