@@ -25,7 +25,7 @@ CONTROLS = {
     "V13": ["python/tautscope/hardware/video.py"],
     "V14": ["python/tautscope/hardware/plausibility.py"],
     "V15": ["python/tautscope/hardware/plausibility.py"],
-    "E1": ["python/tautscope/config/checks.py"],
+    "E1": ["python/tautscope/config/control.py"],
     "E5": ["crates/core/src/article/play.rs", "crates/core/src/article/estimator.rs"],
     "E7": ["python/tautscope/config/section.py", "python/tautscope/config/checks.py"],
     "E8": ["crates/core/src/law/vector_law.rs"],
@@ -62,7 +62,7 @@ CONTROLS = {
         "python/tautscope/console/server.py",
         "python/tautscope/ros2/session.py",
     ],
-    "N2": ["python/tautscope/console/access.py", "python/tautscope/console/pages.py"],
+    "N2": ["python/tautscope/console/server.py", "python/tautscope/console/pages.py"],
     "N3": [
         "python/tautscope/console/operator_input.py",
         "python/tautscope/ros2/references.py",

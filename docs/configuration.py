@@ -11,8 +11,9 @@ from pathlib import Path
 
 import tomlkit
 from tautscope.config import Config
-from tautscope.config.checks import MOST_RATIO, RANGED
+from tautscope.config.checks import RANGED
 from tautscope.config.descriptions import Key, all_sections, keys, package_text, section_text
+from tautscope.config.fields import MOST_RATIO
 
 PAGE = Path(__file__).with_suffix(".md")
 HEAD = """# Configuration

@@ -21,7 +21,7 @@ from calibration.tables import alarm_table, error_table, loop_table
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 
 PAGE = ROOT / "docs" / "calibration.md"
 

@@ -25,7 +25,7 @@ from common.processes import run_parallel
 from conditions.backgrounds import KINDS
 from conditions.frames import CONDITIONS, Evaluation, Job, evaluate, render
 from conditions.rows import table, to_rows
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 
 
 def jobs(frames: int, seeds: Sequence[int], is_tuning: bool) -> list[Job]:

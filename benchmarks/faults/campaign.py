@@ -14,7 +14,7 @@ from common.processes import add_arguments, run_parallel
 from faults import tables
 from faults.runs import run_seed, run_with_each_off
 from faults.scenarios import DURATION, OBSERVED_AFTER, OBSERVED_PERMANENT
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 from tautscope.config import Profile
 from tautscope.loop.safety import DETECTORS
 from tautscope.twin.faults import KINDS

@@ -22,7 +22,7 @@ from hysteresis import ablation, tables
 from hysteresis.goals import GOALS
 from hysteresis.scenarios import SCENARIOS, Plan
 from hysteresis.store import Recordings, Store
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 from tautscope.config import Config, Profile, load_config
 from tautscope.dof import Dof
 

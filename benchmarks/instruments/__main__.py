@@ -21,7 +21,7 @@ from instruments.explanation import explain
 from instruments.properties import markdown_table
 from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
 from instruments.runs import VARIANTS, Figures, Run, simulate
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 
 MOTIONS = ("hand", "sines")
 INSTRUMENTS = 200

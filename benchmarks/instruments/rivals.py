@@ -26,7 +26,7 @@ from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
 from instruments.rival_runs import NAMES, Name, RivalFigures, RivalRun, Triple, simulate
 from numpy.typing import NDArray
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 from tautscope.dof import Dof
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from common.processes import add_arguments, run_parallel
 from soak.cases import PLANTS, Case, Outcome, simulate
 from soak.references import MOTIONS
 from soak.rows import table, to_rows
-from tautscope.commands.progress import progress_bar
+from tautscope.commands.printing import progress_bar
 
 STROKES = (0.3, 0.6, 1.0, 2.0)
 """Over the width of the slack."""

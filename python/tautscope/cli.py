@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import io
 import logging
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 
 from tautscope._core import __version__
 from tautscope.commands import (
@@ -65,7 +66,9 @@ def _main(arguments: Sequence[str] | None) -> int:
         # The verb's own usage lists its options; the parser above it would list the verbs.
         options.usage_error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
-        with _logging(options.verbose):
+        options.stdout = sys.stdout
+        people = io.StringIO() if getattr(options, "json", False) else sys.stdout
+        with _logging(options.verbose), redirect_stdout(people):
             require_extras(f"tautscope {options.verb}", options.extras)
             return options.run(options) or 0
     except TautscopeError as error:

@@ -37,6 +37,16 @@ def missing_modules(extra: str) -> list[str]:
     return [name for name in MODULES[extra] if find_spec(name) is None]
 
 
+def require_module(name: str, what: str, extra: str) -> None:
+    """Check that a module of an extra is installed; `what` needs it, for the error.
+
+    Raises:
+        MissingExtraError: It is not.
+    """
+    if find_spec(name) is None:
+        raise MissingExtraError(what, (name,), (extra,))
+
+
 def require_extras(what: str, extras: Iterable[str]) -> None:
     """Check that extras are installed.
 

@@ -72,6 +72,7 @@ def test_any_bytes_are_a_message_within_its_ranges_or_refused(data: bytes) -> No
             check(decode(data))
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-3, 3) | NUMBERS, max_size=10))
 def test_one_to_eight_axes_are_from_minus_one_to_one(axes: list[float]) -> None:
     fields = {"type": "servo", "lease": 1, "sequence": 1, "image": 1, "is_holding": True}

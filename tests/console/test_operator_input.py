@@ -90,6 +90,7 @@ def test_a_held_key_moves_its_dof_alone() -> None:
     assert not moved[1:].any()
 
 
+@settings(deadline=None)
 @given(st.tuples(*[st.floats(-1, 1)] * 3), st.tuples(*[st.floats(-1, 1)] * 3))
 def test_only_axes_that_have_rested_move_and_none_within_the_dead_band(
     rest: tuple[float, ...], held: tuple[float, ...]

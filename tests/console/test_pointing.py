@@ -10,8 +10,9 @@ import tautscope
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tautscope.console.lease import ImageTimes, Lease
-from tautscope.console.motion_limits import motion_limits
 from tautscope.console.operator_input import COMMAND_TIMEOUT, RAMP_TIME, OperatorInput
+from tautscope.console.pointing import Pointing
+from tautscope.console.programs import motion_limits
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
 from test_operator_input import CONFIG, PERIOD, SPEED, START, Desk
@@ -174,6 +175,22 @@ def test_a_pause_after_arrival_needs_a_new_press() -> None:
         desk.tick()
     hold(desk, ELSEWHERE)
     assert not desk.tick().any()
+
+
+def test_from_rest_all_speed_up_by_one_factor_so_that_the_direction_stays() -> None:
+    point = tuple(pixel(START + np.array([0, 0.5, 0.2])))
+    desk = desk_at(START, point)
+    shares = []
+    while not shares or (shares[-1] < 0.9 and len(shares) < 1000):
+        wanted = Pointing(CONFIG).velocity(
+            desk.input.reference, point, SPEED, PERIOD, lambda direction: np.zeros(3, bool)
+        )
+        hold(desk, point)
+        share = desk.tick()[1:] / (PERIOD * wanted[1:])
+        assert share[0] == pytest.approx(share[1])
+        shares.append(share[0])
+    assert len(shares) > 2
+    assert np.all(np.diff(shares) > 0)
 
 
 def test_a_pixel_that_moves_is_followed() -> None:

@@ -15,8 +15,8 @@ from tautscope.bench.canopen_node import OUT_OF_RANGE, READ_ONLY
 from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.config import DrivesConfig, dump_config, from_document
+from tautscope.config.drive_defaults import FOLDER
 from tautscope.config.drives import Preset
-from tautscope.config.presets import FOLDER
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, FollowingError, SettingRefusedError
 from tautscope.hardware.doctor.drives import check_drives

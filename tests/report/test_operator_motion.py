@@ -10,7 +10,7 @@ from tautscope.report.operator_motion import (
     operator_motion,
 )
 from tautscope.report.tracking_bound import tracking_bound
-from tautscope.runs.recording import FRAME_COLUMNS, Recording, per_dof, trace_columns
+from tautscope.runs.recording import Recording, per_dof, trace_columns, update_columns
 
 PERIOD = 0.02
 START = 100.0  # the rig's clock need not begin at 0
@@ -27,7 +27,7 @@ def recording(error: float, before: float, compensated: bool) -> Recording:
     for dof in Dof:
         trace[f"reference_{dof.label}"] = REFERENCE[:, dof]
         trace[f"true_{dof.label}"] = REFERENCE[:, dof] + np.where(COUNTS, error, before)
-    return Recording(trace, np.zeros(0, FRAME_COLUMNS), CONFIG, compensated, ())
+    return Recording(trace, np.zeros(0, update_columns(Config())), CONFIG, compensated, ())
 
 
 FREE = recording(error=-4e-3, before=1e3, compensated=False)
@@ -73,7 +73,7 @@ def test_by_camera_where_the_true_tip_is_not_known() -> None:
     short = run.trace[TIME < 30]
     for dof in Dof:
         short[f"true_{dof.label}"] = np.nan
-    frames = np.zeros(100, FRAME_COLUMNS)
+    frames = np.zeros(100, update_columns(Config()))
     frames["captured_at"] = START + np.linspace(1, 29, 100)
     late = frames["captured_at"] >= START + (TIME[TIME < 30][-1]) / 2
     for dof in Dof:

@@ -9,7 +9,7 @@ from tautscope.dof import Dof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
 from tautscope.report.results import DofResult, combine, evaluate
-from tautscope.runs.recording import FRAME_COLUMNS, Recording, trace_columns
+from tautscope.runs.recording import Recording, trace_columns, update_columns
 
 START = 100.0  # the rig's clock need not begin at 0
 TIME = np.arange(7000) * 1e-3  # the segment: 1 s to 6 s
@@ -27,7 +27,7 @@ def recording(command: Floats, truth: Floats, estimate: Floats, compensated: boo
     trace["reference_bending"] = REFERENCE
     trace["command_bending"] = command
     trace["true_bending"] = truth
-    frames = np.zeros(len(TIME[SEEN]), FRAME_COLUMNS)
+    frames = np.zeros(len(TIME[SEEN]), update_columns(Config()))
     frames["captured_at"] = START + TIME[SEEN]
     frames["status"] = "held"
     frames["estimate_bending"] = estimate[SEEN]

@@ -152,7 +152,7 @@ def test_titles_with_units() -> None:
 
 
 def test_a_missing_polars_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("tautscope.runs.tables.find_spec", lambda name: None)
+    monkeypatch.setattr("tautscope.extras.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r'polars; type: .*"tautscope\[analysis\]"'):
         read_record(tmp_path / "log.csv", "a", "b")
 

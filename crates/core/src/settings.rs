@@ -1,6 +1,6 @@
 //! Settings that several blocks share.
 
-/// One degree of freedom. Names, units and meaning are those of `python/tautscope/config/dof.py`.
+/// One degree of freedom. Names, units and meaning are those of `python/tautscope/config/control.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct DofSettings {

@@ -6,14 +6,13 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
-from tautscope.commands.printing import print_json
-from tautscope.commands.video_options import (
+from tautscope.commands.positions import (
     add_video_options,
     align_video_options,
     check_video_options,
-    read_motor_options,
+    read_positions,
 )
+from tautscope.commands.printing import print_json
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate, Probe
@@ -58,21 +57,19 @@ def _run(options: argparse.Namespace) -> int:
         document["camera_delay"] = camera_delay if found.is_known else None
         remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
     else:
-        config = article_config(options.config)
-        motors = read_motor_options(options, config)
+        config = arguments.article_config(options.config)
+        motors = read_positions(options.motors, options.units, config)
         found, stamps = align_video_options(options, config, motors, limit=options.within)
         start = float(stamps[0]) - found.delay
         document["video_start"] = start if found.is_known else None
         remedy = f"The first image shows the motors at {start:.3f} s: --video-start {start:.3f}"
     notes = list(implausible_motors(found))
-    if options.json:
-        print_json({**found.to_json(), **document, "notes": notes})
-    else:
-        print_delay(found)
-        if found.is_known:
-            print(f"{remedy}.")
-        for note in notes:
-            print(f"Warning: {note}.")
+    print_json(options, {**found.to_json(), **document, "notes": notes})
+    print_delay(found)
+    if found.is_known:
+        print(f"{remedy}.")
+    for note in notes:
+        print(f"Warning: {note}.")
     return 0 if found.is_known else NO_ANSWER
 
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from tautscope.commands import analyze_episodes, arguments
 from tautscope.commands.analyze_output import print_columns, print_results, results_to_json
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import load_config
 from tautscope.errors import FieldError, RecordError
+from tautscope.runs.columns import list_columns, time_column
+from tautscope.runs.episodes import Episode, is_data_set, list_episodes, open_episode
+from tautscope.runs.records import read_record
+from tautscope.runs.tables import Sheet, open_table
+from tautscope.runs.units import split_unit
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
     from tautscope.analysis.verdict import Verdict
-    from tautscope.runs.episodes import Episode
-    from tautscope.runs.tables import Sheet
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -102,12 +106,14 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from tautscope.analysis.output import write_results  # noqa: PLC0415
-    from tautscope.runs.columns import list_columns  # noqa: PLC0415
 
     if options.command is None and options.measured is None:
         _, sheet = _open(options)
         columns, pairs = list_columns(sheet)
-        print_columns(options.file, columns, pairs, is_json=options.json)
+        proposed = [{"command": command, "measured": tip} for command, tip in pairs]
+        document = {"columns": [asdict(column) for column in columns], "pairs": proposed}
+        print_json(options, document)
+        print_columns(options.file, columns, pairs)
         return 0
     for name in ("command", "measured"):
         if getattr(options, name) is None:
@@ -125,19 +131,14 @@ def _run(options: argparse.Namespace) -> int:
     folder = arguments.out_folder(options)
     results = _results(options, sheet)
     settings = write_results(results, folder)
-    if options.json:
-        print_json({"folder": str(folder), **results_to_json(results, settings)})
-    else:
-        print_results(results, folder)
+    print_json(options, {"folder": str(folder), **results_to_json(results, settings)})
+    print_results(results, folder)
     helps = all(verdict.helps for verdict, _ in results)
     return 0 if helps or not options.check else 1
 
 
 def _open(options: argparse.Namespace) -> tuple[list[Episode], Sheet]:
     """The episodes of a data set, and the table of the first or the chosen one; or a table."""
-    from tautscope.runs.episodes import is_data_set, list_episodes, open_episode  # noqa: PLC0415
-    from tautscope.runs.tables import open_table  # noqa: PLC0415
-
     if not is_data_set(options.file):
         for name in ("episode", "workers"):
             if getattr(options, name) is not None:
@@ -155,10 +156,6 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
     """Verdict and comparison of models per degree of freedom; the file is read once."""
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
     from tautscope.analysis.verdict import judge  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.runs.columns import time_column  # noqa: PLC0415
-    from tautscope.runs.records import read_record  # noqa: PLC0415
-    from tautscope.runs.tables import open_table  # noqa: PLC0415
 
     config = load_config(options.config)
     tips = sheet if options.tip_file is None else open_table(options.tip_file)
@@ -199,8 +196,6 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
 
 def _names(titles: Sequence[str]) -> list[str]:
     """Names of degrees of freedom after the titles of their tips, or axis_1, axis_2, ..."""
-    from tautscope.runs.units import split_unit  # noqa: PLC0415
-
     plain = [split_unit(title)[0].lower() for title in titles]
     names = [re.sub(r"[^a-z0-9]+", "_", each).strip("_")[:32] for each in plain]
     is_usable = len(set(names)) == len(names) and all(re.match("[a-z]", each) for each in names)

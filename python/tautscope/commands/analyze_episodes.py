@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import console, print_json, progress_bar
+from tautscope.runs.episodes import Episode
 from tautscope.runs.output_folder import new_folder
 
 if TYPE_CHECKING:
     from tautscope.analysis.episodes import Summary
-    from tautscope.runs.episodes import Episode
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +48,6 @@ def analyze_episodes(
         summarize,
     )
     from tautscope.analysis.episodes_figure import episodes_figure  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     for name in ("tip_file", "update_distance", "gain", "check", "config"):
         if getattr(options, name):
@@ -66,13 +65,11 @@ def analyze_episodes(
         pl.DataFrame(rows, infer_schema_length=None).write_csv(place / "episodes.csv")
         episodes_figure(rows, names).savefig(place / "episodes.png")
     found = {name: summarize([row for row in rows if row["name"] == name]) for name in names}
-    if options.json:
-        dofs = [
-            {"name": name, "command": command, "measured": tip} | _to_json(found[name])
-            for name, (command, tip) in zip(names, pairs, strict=True)
-        ]
-        print_json({"folder": str(folder), "episodes": len(episodes), "dofs": dofs})
-        return
+    dofs = [
+        {"name": name, "command": command, "measured": tip} | _to_json(found[name])
+        for name, (command, tip) in zip(names, pairs, strict=True)
+    ]
+    print_json(options, {"folder": str(folder), "episodes": len(episodes), "dofs": dofs})
     screen = console()
     for name, (command, tip) in zip(names, pairs, strict=True):
         text = f"{name}: {_text(found[name], len(episodes))}"

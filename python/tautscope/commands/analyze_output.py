@@ -3,38 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import console, print_table
+from tautscope.runs.columns import Column
 
 if TYPE_CHECKING:
     from tautscope.analysis.comparison import Analysis
     from tautscope.analysis.verdict import Verdict
-    from tautscope.runs.columns import Column
 
 
-def print_columns(
-    file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]], *, is_json: bool
-) -> None:
+def print_columns(file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]]) -> None:
     """Print the columns with their ranges, and commands to continue with."""
     import shlex  # noqa: PLC0415
 
-    from rich.table import Table  # noqa: PLC0415
-
-    if is_json:
-        proposed = [{"command": command, "measured": tip} for command, tip in pairs]
-        print_json({"columns": [asdict(column) for column in columns], "pairs": proposed})
-        return
-    table = Table(box=None, pad_edge=False)
-    for heading in ("number", "title", "unit", "values", "least", "largest"):
-        table.add_column(heading, justify="left" if heading in ("title", "unit") else "right")
-    for each in columns:
-        limits = f"{each.least:.6g}", f"{each.largest:.6g}"
-        table.add_row(str(each.number), each.title, each.unit, str(each.count), *limits)
+    rows = [
+        (
+            str(each.number),
+            each.title,
+            each.unit,
+            str(each.count),
+            f"{each.least:.6g}",
+            f"{each.largest:.6g}",
+        )
+        for each in columns
+    ]
+    print_table(("number", "title", "unit", "values", "least", "largest"), rows, left=(1, 2))
     screen = console()
-    screen.print(table)
     print("\nType one of these:" if pairs else "\nNo two columns move together.")
     for command, tip in pairs:
         words = ["tautscope", "analyze", file, "--command", command, "--measured", tip]
@@ -84,30 +80,21 @@ def _text(results: Sequence[tuple[Verdict, Analysis]]) -> str:
 
 
 def _print_models(verdict: Verdict, analysis: Analysis) -> None:
-    from rich.table import Table  # noqa: PLC0415
-
     from tautscope.analysis.comparison import HORIZONS  # noqa: PLC0415
 
-    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = "Error of the predicted tip, RMS over the second half [tip's unit]"
-    table.add_column("model", no_wrap=True)
-    table.add_column("fitted to", no_wrap=True)
     horizons = [f"{100 * share:.0f} %" for share in HORIZONS]
     shown = ("gain", "width") if verdict.found.is_identified else ("gain",)
-    for heading in ("every tip", *horizons, *shown):
-        table.add_column(heading, justify="right", no_wrap=True)
+    rows = []
     for entry in analysis.entries:
         parameters = entry.prediction.parameters
-        table.add_row(
-            entry.model.title,
-            entry.model.fitted_to,
-            f"{entry.rmse:.4g}",
-            *(f"{error.rmse:.4g}" for error in entry.horizons),
-            *(f"{parameters[name]:.4g}" if name in parameters else "" for name in shown),
-        )
-    screen = console()
-    screen.print(table)
-    screen.print(
+        errors = [entry.rmse, *(error.rmse for error in entry.horizons)]
+        found = [f"{parameters[name]:.4g}" if name in parameters else "" for name in shown]
+        cells = [f"{error:.4g}" for error in errors] + found
+        rows.append([entry.model.title, entry.model.fitted_to, *cells])
+    headings = ("model", "fitted to", "every tip", *horizons, *shown)
+    title = "Error of the predicted tip, RMS over the second half [tip's unit]"
+    print_table(headings, rows, title=title, left=(0, 1))
+    console().print(
         "\nevery tip: models fitted off-line get the command alone. 1 % ...: the tip is seen only "
         "after this share of the command's range; off-line models continue from the last tip seen.",
         soft_wrap=True,

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import TypeAlias, get_args
 
-from tautscope.config import RIGS, Profile
+from tautscope.config import RIGS, Config, Profile, load_config
+from tautscope.errors import ConfigError
 from tautscope.runs.output_folder import check_free, default_folder
 
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -63,6 +65,22 @@ def add_config(
         help="TOML file, or the name of a shipped one: "
         f"{', '.join(RIGS)}; missing keys have their defaults{shown}",
     )
+
+
+def article_config(
+    path: str | PathLike[str] | None = None, profile: Profile | None = None
+) -> Config:
+    """As `load_config`, of the article's instrument, which most commands are for.
+
+    Raises:
+        ConfigError: As `load_config`; the configuration has [[dof]].
+    """
+    config = load_config(path, profile)
+    if config.dof:
+        found = ", ".join(dof.name for dof in config.dof)
+        other = "docs/robots.md has what other robots use"
+        raise ConfigError("dof", found, f"none: this is for the article's instrument. {other}")
+    return config
 
 
 def add_profile(parser: argparse.ArgumentParser, what: str) -> None:

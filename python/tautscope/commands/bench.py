@@ -10,9 +10,11 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.bench.events import EventPrinter
+from tautscope.bench.requests import read_requests
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.errors import ConfigError
+from tautscope.hardware.signals import exit_on_signals
 
 if TYPE_CHECKING:
     from tautscope.bench.rig import Bench
@@ -73,17 +75,14 @@ def _fault(text: str) -> tuple[float, str]:
 
 
 def _bench(options: argparse.Namespace) -> None:
-    from tautscope.bench.events import EventPrinter  # noqa: PLC0415
-    from tautscope.bench.requests import read_requests  # noqa: PLC0415
     from tautscope.bench.rig import Bench  # noqa: PLC0415
     from tautscope.hardware.realtime import (  # noqa: PLC0415
         SETPOINTS,
         realtime_process,
         short_switch_interval,
     )
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.drawn is not None:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig, Config
+from tautscope.hardware.cameras import Camera
+from tautscope.hardware.video import open_video_file, read_video
 
 if TYPE_CHECKING:
     from tautscope.calibration.camera.board import Board
@@ -65,7 +67,6 @@ def file_images(files: Sequence[Path]) -> BoardImages:
 def live_images(config: Config, seconds: float) -> BoardImages:
     """Images of the camera of a configuration, for at most so many seconds."""
     from tautscope.calibration.images import to_bgr  # noqa: PLC0415
-    from tautscope.hardware.cameras import Camera  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
 
     def read() -> Generator[Image]:
@@ -101,8 +102,6 @@ def twin_images(config: Config, board: Board) -> BoardImages:
 
 
 def _video_images(file: Path) -> BoardImages:
-    from tautscope.hardware.video import open_video_file, read_video  # noqa: PLC0415
-
     with open_video_file(str(file)) as container:
         stream = container.streams.video[0]
         size = stream.width, stream.height

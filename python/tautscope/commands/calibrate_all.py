@@ -7,18 +7,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibrate_camera import add_board_options
 from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits, twin_seed
+from tautscope.commands.calibration_session import CalibrationSession
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.config import Config
 from tautscope.errors import TautscopeError
+from tautscope.runs.output_folder import check_free, default_folder
 
 if TYPE_CHECKING:
-    from tautscope.calibration.result import CalibrationResult
-    from tautscope.commands.calibration_session import CalibrationSession
     from tautscope.commands.calibration_steps import Step
 
 _NAMES = ("camera", "colour", "geometry", "latency", "doctor", "motion")
@@ -52,11 +52,9 @@ def add_parser(kinds: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.commands.calibration_session import CalibrationSession  # noqa: PLC0415
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     seed = options.seed = twin_seed(options, config) if options.twin else None
     if not options.twin:
         refuse_wrong_limits(options.config)
@@ -74,10 +72,8 @@ def _run(options: argparse.Namespace) -> int:
             _say(f"Stopped. To resume: tautscope calibrate all --config {options.config}")
             return _INCOMPLETE
     report = session.finish({step.name: step.title for step in STEPS})
-    if options.json:
-        print_json({"folder": str(session.folder), "done": session.state.done})
-    else:
-        print(f"Calibrated: {options.config}. Report: {report}")
+    print_json(options, {"folder": str(session.folder), "done": session.state.done})
+    print(f"Calibrated: {options.config}. Report: {report}")
     return 0
 
 

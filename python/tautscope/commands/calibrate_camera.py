@@ -8,16 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
-from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
+from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_twin, twin_seed
+from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
+from tautscope.runs.output_folder import check_free_file
 
 if TYPE_CHECKING:
     from tautscope.calibration.camera.board import Board
-    from tautscope.calibration.result import CalibrationResult
 
 _MODELS = ("pinhole", "fisheye")
 
@@ -83,15 +84,13 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.runs.output_folder import check_free_file  # noqa: PLC0415
-
     if options.board is not None:
         from tautscope.calibration.camera.board import Board  # noqa: PLC0415
 
         board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
-        text = f"Print {options.board} at 100 %, and measure its ruler and squares."
-        finish_file(options, options.board, text)
+        print_json(options, {"file": str(options.board)})
+        print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
         return
     check_options(options)
     if options.ros is not None:
@@ -139,7 +138,7 @@ def calibrate(
 
 
 def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.twin:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 
@@ -153,7 +152,6 @@ def _import(file: Path) -> CalibrationResult:
     """The camera of a ROS camera_info file."""
     from tautscope.calibration.camera.camera_info import read_camera_info  # noqa: PLC0415
     from tautscope.calibration.camera.result import camera_values  # noqa: PLC0415
-    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
 
     values, notes = camera_values(read_camera_info(file))
     return CalibrationResult("camera", values, notes=(f"from {file}", *notes))

@@ -7,15 +7,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
-from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
+from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.commands.recorded_motion import add_motor_options, read_motion
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.calibration.bands.labels import LabelledImage
-    from tautscope.calibration.result import CalibrationResult
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -93,13 +94,13 @@ def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
     if len(files) != 1:
         raise FieldError("files", len(files), "one image, with --page")
     write_click_page(files[0], options.page)
-    finish_file(options, options.page, f"Open {options.page} in a browser, and click on the bands.")
+    print_json(options, {"file": str(options.page)})
+    print(f"Open {options.page} in a browser, and click on the bands.")
 
 
 def calibrate(options: argparse.Namespace) -> CalibrationResult:
     """Move the rig or the twin, and fit the colour of what moves with the motors."""
     from tautscope.calibration.bands.motion import record_motion  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
         found = record_motion(setup.rig, setup.config, progress)

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.commands.recorded_motion import add_motor_options, read_motion
 from tautscope.config import Config
 from tautscope.errors import FieldError, RecordError
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tautscope.calibration.geometry import GeometryFit, Recording
-    from tautscope.calibration.result import CalibrationResult
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -79,10 +79,13 @@ def _run(options: argparse.Namespace) -> int:
         recording = recorder.recording()
     distance = None if options.band_distance is None else options.band_distance * 1e-3
     found = fit(recording, config, intrinsics=options.intrinsics, band_distance=distance)
+    print("\n".join(f"# {line}" for line in table(found)))
     if not found.is_plausible:
-        return _refuse(options, found)
-    if not options.json:
-        print("\n".join(f"# {line}" for line in table(found)))
+        print_json(options, {"is_plausible": False, "warnings": list(found.warnings)})
+        for warning in found.warnings:
+            print(f"warning: {warning}.", file=sys.stderr)
+        print("The model does not explain this record. Nothing was written.", file=sys.stderr)
+        return 1
     finish(options, result(found, serial_numbers, with_figures=options.out is not None))
     if options.out is not None and found.recording.patches:
         from tautscope.report.geometry_figures import write_overlay  # noqa: PLC0415
@@ -96,7 +99,6 @@ def move(
 ) -> tuple[Recording, Config, Mapping[str, str]]:
     """The record of a sweep of the rig or the twin, its configuration and its devices."""
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     with (
         rig_for_calibration(options, camera_is_known=camera_is_known) as setup,
@@ -104,18 +106,6 @@ def move(
     ):
         recording = sweep(setup.rig, setup.config, executor=setup.executor, progress=progress)
         return recording, setup.config, setup.serial_numbers
-
-
-def _refuse(options: argparse.Namespace, found: GeometryFit) -> int:
-    """Say why the result is not used; nothing is written."""
-    if options.json:
-        print_json({"is_plausible": False, "warnings": list(found.warnings)})
-        return 1
-    print("\n".join(f"# {line}" for line in table(found)))
-    for warning in found.warnings:
-        print(f"warning: {warning}.", file=sys.stderr)
-    print("The model does not explain this record. Nothing was written.", file=sys.stderr)
-    return 1
 
 
 def table(found: GeometryFit) -> list[str]:
@@ -137,8 +127,6 @@ def result(
     found: GeometryFit, serial_numbers: Mapping[str, str], *, with_figures: bool = True
 ) -> CalibrationResult:
     """The result in the form that all calibrations have; an error if it is not plausible."""
-    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
-
     if not found.is_plausible:
         raise RecordError(
             "recording", "; ".join(found.warnings), "a record that the model explains"

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments, robot, robot_calibration
 from tautscope.commands.align import NO_ANSWER, print_delay
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import (
     ARTICLE_MOTION,
@@ -26,11 +26,11 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CalibrationError, ConfigError, FieldError
 from tautscope.extras import require_extras
+from tautscope.runs.output_folder import check_free, default_folder
+from tautscope.runs.recording import Recording
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
-    from tautscope.calibration.result import CalibrationResult
-    from tautscope.runs.recording import Recording
 
 SHARE = 0.8
 """Amplitude and period of the motion over those of the experiment: the speed is the same."""
@@ -82,14 +82,10 @@ def _run(options: argparse.Namespace) -> int:
         return robot_calibration.run_latency(options)
     recording, serial_numbers = _recording(options)
     found = align_recording(recording)
+    print_delay(found)
     if not found.is_known:
-        if options.json:
-            print_json({**found.to_json(), "camera_delay": None})
-        else:
-            print_delay(found)
+        print_json(options, {**found.to_json(), "camera_delay": None})
         return NO_ANSWER
-    if not options.json:
-        print_delay(found)
     finish(options, result(found, recording.config, serial_numbers))
     return 0
 
@@ -105,8 +101,6 @@ def result(
     Raises:
         CalibrationError: There is no answer, or the images are stamped before they are captured.
     """
-    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
-
     if not found.is_known:
         remedy = "Give camera.source.delay yourself, or leave out this step: docs/recordings.md"
         raise CalibrationError(f"The delay is unknown: {found.reason}", remedy)
@@ -144,15 +138,13 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         from tautscope.log.reader import read_log  # noqa: PLC0415
 
         return read_log(options.file).recording(), {}
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if not options.twin:
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"
             raise ConfigError("drives", None, allowed)
         refuse_wrong_limits(options.config)
         confirm_motion(options, ARTICLE_MOTION, config)
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
-
     return record(options, config, check_free(options.log or default_folder("latency")))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import add_yes, refuse_wrong_limits
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import confirm
@@ -47,7 +46,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> None:
     from tautscope.hardware.stops import find_stops  # noqa: PLC0415
 
-    config, dof = article_config(options.config), Dof[options.dof.upper()]
+    config, dof = arguments.article_config(options.config), Dof[options.dof.upper()]
     if config.drives is None or config.drives.protocol not in PORTS:
         found = None if config.drives is None else config.drives.protocol
         raise ConfigError("drives.protocol", found, "dynamixel or feetech, whose torque is limited")
@@ -61,9 +60,8 @@ def _run(options: argparse.Namespace) -> None:
     changes = stops.changes(config.drives, dof)
     if options.write:
         write_values(options.config, changes)
-    if options.json:
-        print_json({"dof": dof.label, "stops": [stops.lower, stops.upper], "changes": changes})
-        return
+    ends = [stops.lower, stops.upper]
+    print_json(options, {"dof": dof.label, "stops": ends, "changes": changes})
     for path, value in changes.items():
         print(f"{path} = {value}")
     if options.write:

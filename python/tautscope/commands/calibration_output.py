@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config.edit import edited_text, writable_file, write_values
 from tautscope.errors import FieldError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tautscope.calibration.result import CalibrationResult
+from tautscope.runs.output_folder import check_free, check_writable, new_folder
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,8 +38,6 @@ def check_options(options: argparse.Namespace) -> None:
         FieldError: ``--write`` without ``--config``.
         OutputError: The folder is taken or cannot be written.
     """
-    from tautscope.runs.output_folder import check_free, check_writable  # noqa: PLC0415
-
     if options.write:
         if options.config is None:
             raise FieldError("--write", True, "also --config FILE, the file to write to")
@@ -59,36 +53,17 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
     if options.write:
         write_values(options.config, changes)
     if options.out is not None:
-        _write_folder(options.out, result, text)
-    if options.json:
-        print_json(_document(result, changes))
-        return
+        with new_folder(options.out) as partial:
+            (partial / "values.toml").write_text(text, encoding="utf-8")
+            for k, (figure, _) in enumerate(result.figures, 1):
+                number = f"_{k}" if len(result.figures) > 1 else ""
+                figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
+    values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
+    record = changes[f"calibration.{result.kind}"]
+    notes = list(result.notes)
+    print_json(options, {"values": values, **record, **result.data, "notes": notes})
     print(text, end="")
     for note in result.notes:
         print(f"# {note}")
     if options.write:
         print(f"# written: {options.config}")
-
-
-def finish_file(options: argparse.Namespace, file: Path, text: str) -> None:
-    """Print what to do with a file that was written, or its name as JSON."""
-    if options.json:
-        print_json({"file": str(file)})
-    else:
-        print(text)
-
-
-def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
-    from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
-
-    with new_folder(folder) as partial:
-        (partial / "values.toml").write_text(text, encoding="utf-8")
-        for k, (figure, _) in enumerate(result.figures):
-            number = f"_{k + 1}" if len(result.figures) > 1 else ""
-            figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
-
-
-def _document(result: CalibrationResult, changes: Mapping[str, Any]) -> dict[str, Any]:
-    values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
-    record = changes[f"calibration.{result.kind}"]
-    return {"values": values, **record, **result.data, "notes": list(result.notes)}

@@ -11,17 +11,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
+from tautscope.commands.printing import progress_bar
 from tautscope.commands.question import confirm
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
+from tautscope.hardware.signals import exit_on_signals
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Rig
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 
 if TYPE_CHECKING:
     from tautscope.hardware.run_results import HardwareRun
-    from tautscope.loop.rig import Rig
-    from tautscope.runs.recording import Recording
 
 ARTICLE_MOTION = "in the range of [experiment]. Hold the scope still, keep"
 
@@ -83,7 +86,7 @@ def rig_for_calibration(
             whether the motors may move is not answered with y.
         TautscopeError: Errors of the rig.
     """
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
         from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
@@ -104,7 +107,6 @@ def rig_for_calibration(
     from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
     from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     require_drives(config)
     # On every exit the motors are quick-stopped.
@@ -121,10 +123,6 @@ def run_protocol(
     options: argparse.Namespace, config: Config, folder: Path, title: str
 ) -> tuple[Recording, HardwareRun | None]:
     """Run the sines of a configuration on the rig, which logs them in a folder, or on the twin."""
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.loop.references import SineSequence  # noqa: PLC0415
-    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-
     with progress_bar(title) as progress:
         if not options.twin:
             from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415

@@ -7,17 +7,16 @@ import json
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
-from tautscope.commands.article_config import article_config
+from tautscope.calibration.result import CalibrationResult
+from tautscope.commands.arguments import article_config
 from tautscope.config import Config, dump_config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
-
-if TYPE_CHECKING:
-    from tautscope.calibration.result import CalibrationResult
+from tautscope.report.report import document
 
 
 class SessionState(msgspec.Struct, forbid_unknown_fields=True):
@@ -98,8 +97,6 @@ class CalibrationSession:
         return report
 
     def _page(self, titles: Mapping[str, str]) -> str:
-        from tautscope.report.report import document  # noqa: PLC0415
-
         parts = []
         for name, title in titles.items():
             file = self.folder / f"{name}.json"

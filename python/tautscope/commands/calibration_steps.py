@@ -16,8 +16,12 @@ from tautscope.commands import (
     calibrate_latency,
 )
 from tautscope.commands.calibration_rig import run_protocol
+from tautscope.commands.doctor import run_checks
+from tautscope.commands.result_lines import summary_line
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
+from tautscope.hardware.doctor.calibration import check_calibration
+from tautscope.report.results import evaluate
 
 MOTION_PERIODS = 3
 """Periods per DOF of the first compensated motion."""
@@ -75,9 +79,6 @@ def _latency(options: argparse.Namespace, config: Config, folder: Path) -> Calib
 
 
 def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.commands.doctor import run_checks  # noqa: PLC0415
-    from tautscope.hardware.doctor.calibration import check_calibration  # noqa: PLC0415
-
     if options.twin:
         findings = check_calibration(config.calibration, {})
     else:
@@ -92,9 +93,7 @@ def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _motion(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.commands.result_lines import summary_line  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
-    from tautscope.report.results import evaluate  # noqa: PLC0415
 
     config = config.replace(**{"experiment.periods": MOTION_PERIODS})
     place = _unused(folder, MOTION)

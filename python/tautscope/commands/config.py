@@ -7,6 +7,8 @@ import argparse
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config import load_config, to_document
+from tautscope.config.placeholders import placeholders
+from tautscope.config.template import template
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -23,11 +25,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _config(options: argparse.Namespace) -> None:
-    from tautscope.config.placeholders import placeholders  # noqa: PLC0415
-    from tautscope.config.template import template  # noqa: PLC0415
-
     config = load_config(options.config)
-    if options.json:
-        print_json(to_document(config))
-    else:
-        print(template(config, placeholders(options.config)), end="")
+    print_json(options, to_document(config))
+    print(template(config, placeholders(options.config)), end="")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_now
+from tautscope.commands.printing import print_json
 from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in_words
 from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
@@ -44,8 +44,8 @@ def _console(options: argparse.Namespace) -> int:
         raise ConfigError("port", options.port, "a port from 0 to 65535")
 
     def announce(url: str) -> None:
-        text = f"The console of {what}: {url}\n{note} Ctrl-C ends."
-        print_now(options.json, "url", url, text)
+        print_json(options, {"url": url})
+        print(f"The console of {what}: {url}\n{note} Ctrl-C ends.", flush=True)
 
     if options.replay is not None:
         require_extras("tautscope console --replay", ["hardware"])
@@ -62,6 +62,6 @@ def _console(options: argparse.Namespace) -> int:
     what, note = rig_in_words(options), "Whoever has this address can move it."
     status = start_console(make(config), config, folder, options.port, announce)
     for log in sorted(folder.glob("console-*.mcap")):
-        text = f"Log: {log}\nSee it again: {replay_command(log)}"
-        print_now(options.json, "log", str(log), text)
+        print_json(options, {"log": str(log)})
+        print(f"Log: {log}\nSee it again: {replay_command(log)}", flush=True)
     return status

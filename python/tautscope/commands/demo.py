@@ -8,20 +8,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, robot
-from tautscope.commands.article_config import article_config
-from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import announce, console, print_json
+from tautscope.commands.printing import (
+    announce,
+    console,
+    print_json,
+    print_table,
+    progress_bar,
+)
 from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
+from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
+from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
-    from tautscope.report.rows import Row
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
@@ -80,7 +83,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.report import demo, tables  # noqa: PLC0415
 
     if options.robot is not None:
@@ -106,21 +108,19 @@ def _run(options: argparse.Namespace) -> None:
     with recording_saved(folder), progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
-    if options.json:
-        document = tables.to_json(
-            config.profile,
-            seeds,
-            found.results,
-            found.operator_results,
-            sim_seconds=found.sim_seconds,
-            wall_seconds=found.wall_seconds,
-            article_results=found.article_results,
-        )
-        print_json({"folder": str(folder), **document})
-    else:
-        _print_table1(found)
-        _print_operator_motion(found)
-        _print_facts(found, folder)
+    document = tables.to_json(
+        config.profile,
+        seeds,
+        found.results,
+        found.operator_results,
+        sim_seconds=found.sim_seconds,
+        wall_seconds=found.wall_seconds,
+        article_results=found.article_results,
+    )
+    print_json(options, {"folder": str(folder), **document})
+    _print_table1(found)
+    _print_operator_motion(found)
+    _print_facts(found, folder)
 
 
 def _run_robot(options: argparse.Namespace) -> None:
@@ -135,7 +135,7 @@ def _run_robot(options: argparse.Namespace) -> None:
 
 
 def _load(options: argparse.Namespace) -> Config:
-    config = article_config(options.config, options.profile)
+    config = arguments.article_config(options.config, options.profile)
     changes: dict[str, Any] = {}
     if options.seed is not None:
         changes["twin.seed"] = options.seed
@@ -150,15 +150,8 @@ def _load(options: argparse.Namespace) -> Config:
     return config
 
 
-def _table(title: str, seeds: int) -> Table:
-    """An empty table of figures of a number of seeds."""
-    from rich.table import Table  # noqa: PLC0415
-
-    if seeds > 1:
-        title += f" (median of {seeds} seeds, worst in brackets)"
-    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
-    table.add_column("", no_wrap=True)
-    return table
+def _title(text: str, seeds: int) -> str:
+    return f"{text} (median of {seeds} seeds, worst in brackets)" if seeds > 1 else text
 
 
 def _cell(
@@ -178,46 +171,38 @@ def _cell(
 
 def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import ROWS  # noqa: PLC0415
 
-    profiles = demo.by_profile
+    profiles, dofs = demo.by_profile, list(demo.results[0])
     several = len(demo.seeds) > 1
     figures = [(tables.median(results), tables.worst(results)) for results in profiles.values()]
-    table = _table("Table 1: the article, and the twin", len(demo.seeds))
-    for dof in demo.results[0]:
-        table.add_column(
-            f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
-        )
-        for name in profiles:
-            table.add_column(f"\n{name}", justify="right")
+    headings, rows = [""], []
+    for dof in dofs:
+        headings += [f"{tables.heading(dof)}\narticle", *(f"\n{name}" for name in profiles)]
     for row in ROWS:
         cells = []
-        for dof in demo.results[0]:
+        for dof in dofs:
             cells.append(tables.article_cell(row, dof))
             cells += [_cell(row, dof, *each, several=several) for each in figures]
-        table.add_row(row.title, *cells)
-    screen = console()
-    screen.print(table)
-    screen.print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
+        rows.append([row.title, *cells])
+    title = _title("Table 1: the article, and the twin", len(demo.seeds))
+    print_table(headings, rows, title=title, dim=range(1, len(headings), len(profiles) + 1))
+    print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
 
 
 def _print_operator_motion(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import OPERATOR_ROWS  # noqa: PLC0415
 
     results = demo.operator_results
     several = len(results) > 1
-    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
-    table = _table(title, len(results))
     middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
-    for dof in middle:
-        table.add_column(tables.heading(dof), justify="right", no_wrap=True)
-    for row in OPERATOR_ROWS:
-        cells = [_cell(row, dof, middle, bad, several=several) for dof in middle]
-        table.add_row(row.title, *cells)
-    screen = console()
-    screen.print(table)
-    screen.print("Errors of the true tip, after the first 40 s.\n")
+    rows = [
+        [row.title, *(_cell(row, dof, middle, bad, several=several) for dof in middle)]
+        for row in OPERATOR_ROWS
+    ]
+    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
+    headings = ["", *map(tables.heading, middle)]
+    print_table(headings, rows, title=_title(title, len(results)))
+    print("Errors of the true tip, after the first 40 s.\n")
 
 
 def _print_facts(demo: Demo, folder: Path) -> None:

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.commands.rig_choice import add_rig, choose_rig
+from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import missing_modules
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from tautscope.config import Config
-    from tautscope.hardware.doctor.check_result import CheckResult
-    from tautscope.loop.rig import Rig
+from tautscope.hardware.doctor.calibration import check_calibration
+from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.doctor.rig import check_rig
+from tautscope.hardware.signals import exit_on_signals
+from tautscope.loop.rig import Rig
 
 QUESTION = (
     "The rig will be reset, WHICH MAY MOVE ITS MOTORS to their start, and held there for 3 s. "
@@ -59,7 +57,6 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         folder: Folder for recordings.
     """
     from tautscope.hardware.doctor import camera, computer, drives  # noqa: PLC0415
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
 
     yield from computer.check_computer(config)
     yield computer.check_disk(config, folder)
@@ -67,7 +64,6 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield drives.check_interfaces(needed=not is_rig)
     if missing_modules("hardware"):
         return
-    from tautscope.hardware.doctor.calibration import check_calibration  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
 
     if not is_rig:
@@ -105,9 +101,6 @@ def _check_own(
     Raises:
         ConfigError: There is no such rig, or the configuration has no [[dof]].
     """
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
-    from tautscope.hardware.doctor.rig import check_rig  # noqa: PLC0415
-
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
     if config.drives is not None:
@@ -131,38 +124,31 @@ def _check_own(
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
-
     if options.rig is None and options.yes:
         raise FieldError("--yes", True, "--rig: without it nothing moves")
     if options.rig is None:
-        config = article_config(options.config)
+        config = arguments.article_config(options.config)
         checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
     else:
         checks = _check_own(options, *choose_rig(options))
     marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():
-        for found in itertools.chain(_check_placeholders(marked), checks):
+        if marked:
+            todo = f"Replace each value, then delete the word {MARK} beside it"
+            what = f"not replaced: {', '.join(marked)}"
+            checks = itertools.chain(
+                [CheckResult("configuration", "placeholders", "missing", what, todo)], checks
+            )
+        for found in checks:
             findings.append(found)
-            if not options.json:
-                _print(found)
+            _print(found)
     missing = sum(found.status == "missing" for found in findings)
-    if options.json:
-        print_json({"complete": not missing, "findings": [found.to_json() for found in findings]})
-    else:
-        result = f"{missing} missing." if missing else "All there."
-        print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
+    shown = [found.to_json() for found in findings]
+    print_json(options, {"complete": not missing, "findings": shown})
+    result = f"{missing} missing." if missing else "All there."
+    print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
     return 1 if missing else 0
-
-
-def _check_placeholders(marked: Sequence[str]) -> Iterator[CheckResult]:
-    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
-
-    if marked:
-        todo = f"Replace each value, then delete the word {MARK} beside it"
-        found = f"not replaced: {', '.join(marked)}"
-        yield CheckResult("configuration", "placeholders", "missing", found, todo)
 
 
 def _print(found: CheckResult) -> None:

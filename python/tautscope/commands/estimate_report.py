@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -9,48 +10,36 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from rich.table import Table
-
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import print_json, print_table
 from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.recording import Recording
 
 
 def write_estimates(
+    options: argparse.Namespace,
     folder: Path,
     replayed: Recording,
     recorded: Recording | None,
-    *,
-    as_json: bool,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
     """Write the folder of a replay, and print its estimates beside the recorded ones.
 
     Args:
+        options: Of the command.
         folder: The new folder.
         replayed: The estimates.
         recorded: Those of the run, if there was one.
-        as_json: Whether to print JSON.
         facts: Further entries of the JSON object.
     """
     write_replay(folder, replayed, recorded)
     after = estimation_quality(replayed, recorded)
     before = None if recorded is None else estimation_quality(recorded)
-    if as_json:
-        document: dict[str, Any] = {
-            "folder": str(folder),
-            "images": len(replayed.frames),
-            **facts,
-            "dof": {},
-        }
-        for label, figures in after.items():
-            entry = {"replayed": _finite(figures)}
-            if before is not None:
-                entry["recorded"] = _finite(before[label])
-            document["dof"][label] = entry
-        print_json(document)
-        return
+    dofs = {label: {"replayed": _finite(figures)} for label, figures in after.items()}
+    for label, figures in (before or {}).items():
+        dofs[label]["recorded"] = _finite(figures)
+    images = len(replayed.frames)
+    print_json(options, {"folder": str(folder), "images": images, **facts, "dof": dofs})
     _print_table(replayed, before, after)
     print(f"\nFigure and data: {folder / 'replay.png'}")
 
@@ -61,15 +50,12 @@ def _print_table(
     after: dict[str, EstimationQuality],
 ) -> None:
     noun = "measurements" if replayed.config.dof else "images"
-    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = f"Estimates from {len(replayed.frames)} {noun}"
-    table.add_column("", no_wrap=True)
     dofs = replayed.config.dofs
+    headings = [""]
     for dof in dofs:
         unit = f"{dof.label} [{dof.display_unit}]"
-        if before is not None:
-            table.add_column(f"{unit}\nrecorded", justify="right", style="dim", no_wrap=True)
-        table.add_column("\nreplayed" if before else unit, justify="right", no_wrap=True)
+        headings += [f"{unit}\nrecorded", "\nreplayed"] if before else [unit]
+    rows = []
     for title, name in (
         ("backlash width at the end", "width"),
         (f"{noun} with the DOF observable", "seen"),
@@ -81,8 +67,9 @@ def _print_table(
             pair = [each[dof.label] for each in (before, after) if each is not None]
             cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
         if any(cells):
-            table.add_row(title, *cells)
-    console().print(table)
+            rows.append([title, *cells])
+    title = f"Estimates from {len(replayed.frames)} {noun}"
+    print_table(headings, rows, title=title, dim=range(1, len(headings), 2) if before else ())
 
 
 def _cell(value: float, name: str, scale: float) -> str:

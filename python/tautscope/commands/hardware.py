@@ -6,17 +6,17 @@ import argparse
 import sys
 
 from tautscope.commands import arguments, robot
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import add_yes, confirm_motion
-from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
-from tautscope.commands.printing import announce, print_json
+from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.result_lines import print_results
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.run_protocol import add_protocol, apply_protocol, write_environment
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError
+from tautscope.hardware.doctor.computer import bytes_per_second
 from tautscope.loop.references import SineSequence
+from tautscope.runs.output_folder import recording_saved
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -61,8 +61,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.doctor.computer import bytes_per_second  # noqa: PLC0415
     from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
@@ -76,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--rig")
-    config = article_config(options.config, options.profile)
+    config = arguments.article_config(options.config, options.profile)
     refuse_placeholders(options.config)
     if options.periods is not None:
         if options.reference is not None:
@@ -98,9 +96,7 @@ def _run(options: argparse.Namespace) -> int:
     write_run_folder(found, folder)
     if options.protocol == "desktop":
         write_environment(options, config, folder)
-    if options.json:
-        print_json({"folder": str(folder), **found.to_json()})
-        return 0
+    print_json(options, {"folder": str(folder), **found.to_json()})
     timing = found.compensated.timing.summary()
     print(
         f"{timing['cycles']} cycles, {timing['lost_cycles']} lost; set-points at most "

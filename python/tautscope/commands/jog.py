@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import confirm
@@ -52,7 +51,7 @@ def _jog(options: argparse.Namespace) -> None:
 
     distance = options.distance
     if options.rig is None:
-        config = article_config(options.config)
+        config = arguments.article_config(options.config)
     else:
         config, make_rig = choose_rig(options)
     names = [dof.label for dof in config.dofs]
@@ -77,10 +76,9 @@ def _jog(options: argparse.Namespace) -> None:
     else:
         assert config.drives is not None
         largest, end = jog(config.drives, Dof(index), distance)
-    if options.json:
-        found = {"dof": dof.label, "moved": largest, "ended_at": end}
-        print_json(found | ({"sensors": [asdict(each) for each in seen]} if options.rig else {}))
-        return
+    found = {"dof": dof.label, "moved": largest, "ended_at": end}
+    sensors = {"sensors": [asdict(each) for each in seen]} if options.rig else {}
+    print_json(options, found | sensors)
     scale, unit = dof.display_scale, dof.display_unit
     print(f"{dof.label}: moved {scale * largest:.4f} {unit}, ended at {scale * end:.4f} {unit}")
     for each in seen:

@@ -6,20 +6,21 @@ import argparse
 import logging
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
-from tautscope.commands.printing import print_json
-from tautscope.commands.video_options import (
+from tautscope.commands.positions import (
     add_video_options,
     align_video_options,
     check_video_options,
-    read_motor_options,
+    read_positions,
 )
+from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 from tautscope.extras import require_extras
+from tautscope.hardware.video import read_video
+from tautscope.log.comparison import write_replay
 from tautscope.runs.output_folder import check_free
 
 if TYPE_CHECKING:
@@ -99,71 +100,51 @@ def _recover(options: argparse.Namespace) -> None:
     file: Path = options.file
     recovery = recover(file, options.out or file.with_name(f"{file.stem}-recovered.mcap"))
     duration = (recovery.last - recovery.first) / 1e9
-    if options.json:
-        print_json(
-            {
-                "file": str(recovery.path),
-                "messages": recovery.messages,
-                "skipped": recovery.skipped,
-                "seconds": duration,
-                "damage": _damage(recovery.damage),
-            }
-        )
-        return
+    document = {
+        "file": str(recovery.path),
+        "messages": recovery.messages,
+        "skipped": recovery.skipped,
+        "seconds": duration,
+    }
     print(f"{recovery.path}: {sum(recovery.messages.values())} messages over {duration:.1f} s.")
     if recovery.skipped:
         print(f"Not copied, because no log of tautscope has them: {', '.join(recovery.skipped)}.")
     if not recovery.damage:
         print(f"{file} was complete.")
-    _print_damage(file, recovery.damage)
+    _print_damage(options, document, recovery.damage)
 
 
 def _export(options: argparse.Namespace) -> None:
     from tautscope.log.export import export_csv, export_rosbag  # noqa: PLC0415
 
     file: Path = options.file
+    document: dict[str, Any]
     if options.rosbag is not None:
         recovery = export_rosbag(file, options.rosbag)
-        if options.json:
-            damage = _damage(recovery.damage)
-            bag = str(options.rosbag)
-            print_json({"folder": bag, "messages": recovery.messages, "damage": damage})
-            return
+        damage = recovery.damage
+        document = {"folder": str(options.rosbag), "messages": recovery.messages}
         print(f"{options.rosbag}: {sum(recovery.messages.values())} messages.")
-        _print_damage(file, recovery.damage)
-        return
-    if options.rerun is not None:
-        _export_rerun(options)
-        return
-    folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
-    found = export_csv(file, folder)
-    if options.json:
-        print_json({"folder": str(folder), "damage": _damage(found)})
-        return
-    print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
-    _print_damage(file, found)
+    elif options.rerun is not None:
+        require_extras("tautscope export --rerun", ["rerun"])
+        from tautscope.log.rerun_export import export_rerun  # noqa: PLC0415
+
+        log, images = export_rerun(file, options.rerun)
+        damage = log.damage
+        document = {"file": str(options.rerun), "images": images}
+        print(f"{options.rerun}: {len(log.events)} ticks, updates and requests, {images} images.")
+    else:
+        folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
+        damage = export_csv(file, folder)
+        document = {"folder": str(folder)}
+        print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
+    _print_damage(options, document, damage)
 
 
-def _export_rerun(options: argparse.Namespace) -> None:
-    require_extras("tautscope export --rerun", ["rerun"])
-    from tautscope.log.rerun_export import export_rerun  # noqa: PLC0415
-
-    log, images = export_rerun(options.file, options.rerun)
-    if options.json:
-        damage = _damage(log.damage)
-        print_json({"file": str(options.rerun), "images": images, "damage": damage})
-        return
-    print(f"{options.rerun}: {len(log.events)} ticks, updates and requests, {images} images.")
-    _print_damage(options.file, log.damage)
-
-
-def _damage(damage: Damage) -> dict[str, int]:
-    return {"lost_bytes": damage.lost_bytes, "bad_chunks": damage.bad_chunks}
-
-
-def _print_damage(file: Path, damage: Damage) -> None:
+def _print_damage(options: argparse.Namespace, document: dict[str, Any], damage: Damage) -> None:
+    found = {"lost_bytes": damage.lost_bytes, "bad_chunks": damage.bad_chunks}
+    print_json(options, {**document, "damage": found})
     if damage:
-        print(f"{file} is {'truncated' if damage.is_truncated else 'damaged'}: {damage}.")
+        print(f"{options.file} is {'truncated' if damage.is_truncated else 'damaged'}: {damage}.")
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -179,7 +160,6 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _replay_same(options: argparse.Namespace, log: Log) -> int:
-    from tautscope.log.comparison import write_replay  # noqa: PLC0415
     from tautscope.log.replay import replay_same  # noqa: PLC0415
 
     if options.out is not None:
@@ -187,23 +167,20 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
     comparison, replayed = replay_same(log)
     if options.out is not None:
         write_replay(options.out, replayed, log.recording())
-    if options.json:
-        folder = None if options.out is None else str(options.out)
-        identical = comparison.is_identical
-        print_json({"folder": folder, "identical": identical, **asdict(comparison)})
-    else:
-        print(
-            f"{comparison.same_ticks} of {comparison.ticks} commands and "
-            f"{comparison.same_updates} of {comparison.updates} updates identical, "
-            "bit for bit."
-        )
-        if comparison.first_difference:
-            print(f"First difference: {comparison.first_difference}.")
-            if log.config.recording.image_format != "png":
-                print("The images of this log are not lossless, so differences are expected.")
-        if comparison.ended:
-            print(f"The comparison ended early: {comparison.ended}.")
-        _print_warnings(log)
+    folder = None if options.out is None else str(options.out)
+    identical = comparison.is_identical
+    print_json(options, {"folder": folder, "identical": identical, **asdict(comparison)})
+    print(
+        f"{comparison.same_ticks} of {comparison.ticks} commands and "
+        f"{comparison.same_updates} of {comparison.updates} updates identical, bit for bit."
+    )
+    if comparison.first_difference:
+        print(f"First difference: {comparison.first_difference}.")
+        if log.config.recording.image_format != "png":
+            print("The images of this log are not lossless, so differences are expected.")
+    if comparison.ended:
+        print(f"The comparison ended early: {comparison.ended}.")
+    _print_warnings(log)
     return 0 if comparison.is_identical else 1
 
 
@@ -217,24 +194,21 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
         config = load_config(options.config, options.profile)
     folder = arguments.out_folder(options)
     replayed, skipped = estimate_from_log(log, config)
-    write_estimates(folder, replayed, log.recording(), as_json=options.json)
-    if not options.json:
-        if skipped:
-            print(f"{skipped} updates were skipped: their images are not in the log.")
-        _print_warnings(log)
+    write_estimates(options, folder, replayed, log.recording())
+    if skipped:
+        print(f"{skipped} updates were skipped: their images are not in the log.")
+    _print_warnings(log)
     return 0
 
 
 def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.commands.estimate_report import write_estimates  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.log.alignment import implausible_motors  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_video, retimed  # noqa: PLC0415
 
-    config: Config = article_config(options.config, options.profile)
+    config: Config = arguments.article_config(options.config, options.profile)
     folder = arguments.out_folder(options)
-    motors = read_motor_options(options, config)
+    motors = read_positions(options.motors, options.units, config)
     found, stamps = align_video_options(options, config, motors)
     for note in implausible_motors(found):
         _LOG.warning("%s", note)
@@ -264,14 +238,13 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
         replayed = estimate_from_video(frames, *motors, config, progress)
     used = start if options.video_start is None else options.video_start
     facts = {"video_start": used, "delay": found.to_json()}
-    write_estimates(folder, replayed, None, as_json=options.json, facts=facts)
-    if not options.json:
-        images, times = replayed.frames["captured_at"], replayed.trace["time"]
-        how = "estimated" if options.video_start is None else "given"
-        print(
-            f"The video begins at {used:.3f} s of the motor positions ({how}); images cover "
-            f"{images[0]:.2f} to {images[-1]:.2f} s of their {times[0]:.2f} to {times[-1]:.2f} s."
-        )
+    write_estimates(options, folder, replayed, None, facts)
+    images, times = replayed.frames["captured_at"], replayed.trace["time"]
+    how = "estimated" if options.video_start is None else "given"
+    print(
+        f"The video begins at {used:.3f} s of the motor positions ({how}); images cover "
+        f"{images[0]:.2f} to {images[-1]:.2f} s of their {times[0]:.2f} to {times[-1]:.2f} s."
+    )
     return 0
 
 

@@ -1,16 +1,26 @@
-"""Options that read positions of the three DOFs: a file, and the units of its columns."""
+"""Options that read positions of the three DOFs, the units of their columns, and a video."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.commands import arguments
+from tautscope.commands.printing import progress_bar
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError, RecordError
+from tautscope.hardware.video import read_video
 from tautscope.loop.references import RecordedReference
+from tautscope.runs.records import read_motors
+from tautscope.runs.units import parse_units
+
+if TYPE_CHECKING:
+    from tautscope.calibration.delay import DelayEstimate
 
 Floats = NDArray[np.float64]
 
@@ -42,9 +52,6 @@ def add_reference(parser: argparse.ArgumentParser, replaces: str) -> None:
 
 def read_positions(path: str, units: str, config: Config) -> tuple[Floats, Floats]:
     """Time (n,) [s] and positions (n, 3) [m, rad, rad], see `read_motors`."""
-    from tautscope.runs.records import read_motors  # noqa: PLC0415  Polars
-    from tautscope.runs.units import parse_units  # noqa: PLC0415
-
     sines = [config.experiment[dof] for dof in Dof]
     largest = [LARGEST_WORKSPACES * (abs(sine.centre) + sine.amplitude) for sine in sines]
     return read_motors(path, parse_units(units), np.array(largest))
@@ -67,18 +74,56 @@ def read_reference(options: argparse.Namespace, config: Config) -> RecordedRefer
     if len(time) < 2:
         raise RecordError(str(options.reference), f"{len(time)} line", "at least 2")
     if config.drives is not None:
-        _check_travel(options.reference, positions, config)
+        for dof in Dof:
+            lower, upper = config.drives[dof].travel
+            farthest = max(positions[:, dof], key=lambda each: max(lower - each, each - upper))
+            if not lower <= farthest <= upper:
+                where = f"{options.reference}, column {dof.label}"
+                allowed = f"{lower:g} to {upper:g}, drives.{dof.label}.travel"
+                raise RecordError(where, float(farthest), allowed)
     return RecordedReference(time, positions, config)
 
 
-def _check_travel(path: str, positions: Floats, config: Config) -> None:
-    assert config.drives is not None
-    for dof in Dof:
-        lower, upper = config.drives[dof].travel
-        farthest = max(positions[:, dof], key=lambda value: max(lower - value, value - upper))
-        if not lower <= farthest <= upper:
-            raise RecordError(
-                f"{path}, column {dof.label}",
-                float(farthest),
-                f"{lower:g} to {upper:g}, drives.{dof.label}.travel",
-            )
+def add_video_options(parser: argparse.ArgumentParser, start_help: str) -> None:
+    """``FILE.mcap`` or ``--video``, ``--motors``, ``--units``, ``--video-start``."""
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE.mcap")
+    parser.add_argument("--video", metavar="FILE", help="video instead of a log; needs --motors")
+    parser.add_argument(
+        "--motors",
+        metavar="FILE",
+        help="motor positions: CSV or Parquet with columns time, insertion, rotation, bending; "
+        "- reads standard input",
+    )
+    add_units(parser)
+    parser.add_argument("--video-start", type=arguments.seconds, metavar="S", help=start_help)
+
+
+def check_video_options(options: argparse.Namespace) -> None:
+    """Check that there is either a log or a video with motor positions.
+
+    Raises:
+        FieldError: There is not.
+    """
+    if (options.file is None) == (options.video is None):
+        given = None if options.file is None else "a log and --video"
+        raise FieldError(options.verb, given, "a log, or --video with --motors")
+    if (options.video is None) != (options.motors is None):
+        raise FieldError("--motors", options.motors, "a file of motor positions and --video")
+
+
+def align_video_options(
+    options: argparse.Namespace, config: Config, motors: tuple[Floats, Floats], limit: float = 5.0
+) -> tuple[DelayEstimate, Floats]:
+    """Delay of the frames of ``--video``.
+
+    Their stamps begin with ``--video-start``, or with the first time of the motors.
+
+    Returns:
+        The estimate, and the stamps of the frames (m,) [s].
+    """
+    from tautscope.log.alignment import align_video  # noqa: PLC0415
+
+    start = float(motors[0][0]) if options.video_start is None else options.video_start
+    frames = read_video(options.video, config.camera, start)
+    with progress_bar("delay of the video") as progress:
+        return align_video(frames, *motors, config, limit=limit, progress=progress)

@@ -1,12 +1,15 @@
-"""Printing of JSON and tables."""
+"""What commands print: text and tables, or with ``--json`` one object; progress on stderr."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import shutil
 import sys
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tautscope.errors import OutputError
 
@@ -14,18 +17,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_json(document: dict[str, Any]) -> None:
-    """Print a document in one line; it must not contain NaN."""
-    print(json.dumps(document, allow_nan=False))
+def print_json(options: argparse.Namespace, document: dict[str, Any]) -> None:
+    """With ``--json``, print a document in one line, at once; it must not contain NaN.
 
-
-def print_now(is_json: bool, key: str, value: str, text: str) -> None:
-    """Print a text, or of ``--json`` a key with its value, at once, also into a pipe."""
-    if is_json:
-        print_json({key: value})
-    else:
-        print(text)
-    sys.stdout.flush()
+    `tautscope.cli` then prints nothing else on the standard output.
+    """
+    if options.json:
+        print(json.dumps(document, allow_nan=False), file=options.stdout, flush=True)
 
 
 def announce(what: str, seconds: float, size: float, folder: Path) -> None:
@@ -57,3 +55,37 @@ def console() -> Console:
 
     width = None if sys.stdout.isatty() else 200
     return Console(highlight=False, markup=False, width=width)
+
+
+def print_table(
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    title: str | None = None,
+    left: Container[int] = (0,),
+    dim: Container[int] = (),
+) -> None:
+    """Print a table: columns to the right, but for those in `left`; those in `dim` are dimmed."""
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(title=title, box=None, pad_edge=False, title_justify="left", title_style="bold")
+    for k, heading in enumerate(headings):
+        side: Literal["left", "right"] = "left" if k in left else "right"
+        table.add_column(heading, justify=side, style="dim" if k in dim else None, no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    console().print(table)
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
+    """Yield a function to call with the share of work done, 0 to 1; only a terminal has a bar."""
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console  # noqa: PLC0415
+    from rich.progress import Progress  # noqa: PLC0415
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

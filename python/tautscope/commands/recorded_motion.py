@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.hardware.video import read_video
+from tautscope.runs.records import read_motors
 
 if TYPE_CHECKING:
     from tautscope.calibration.motion import ImageRecorder
@@ -48,10 +49,7 @@ def read_motion(
         return _read_log(options, file, make)
     if options.motors is None:
         raise FieldError("file", str(file), allowed)
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
-    from tautscope.runs.records import read_motors  # noqa: PLC0415
-
-    config = article_config(options.config)
+    config = arguments.article_config(options.config)
     recorder = make(config)
     times, positions = read_motors(options.motors)
     for time, position in zip(times, positions, strict=True):
@@ -66,13 +64,12 @@ def _read_log(
     options: argparse.Namespace, file: Path, make: Callable[[Config], Recorder]
 ) -> tuple[Recorder, Config]:
     from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
-    from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(file)
-    config = log.config if options.config is None else article_config(options.config)
+    config = log.config if options.config is None else arguments.article_config(options.config)
     config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
     recorder = make(config)
-    captured = (FRAME_COLUMNS.names or ()).index("captured_at")
+    captured = log.update_names.index("captured_at")
     for index, event in log.events.items():
         if isinstance(event, Tick):
             recorder.add_tick(event.sample.time, event.sample.applied)

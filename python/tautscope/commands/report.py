@@ -8,6 +8,7 @@ from pathlib import Path
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.commands.result_lines import print_results
+from tautscope.report.run_folder import write_report
 from tautscope.runs.output_folder import new_folder
 
 
@@ -37,7 +38,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.log.stored_run import read_run  # noqa: PLC0415
-    from tautscope.report.run_folder import write_report  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
     stored = read_run(options.path, options.uncompensated)
@@ -49,7 +49,6 @@ def _run(options: argparse.Namespace) -> None:
     }
     with new_folder(folder) as place:
         write_report(stored.run, place, facts)
-    if options.json:
-        print_json({"folder": str(folder), "source": str(stored.source), **stored.run.summary()})
-        return
+    document = {"folder": str(folder), "source": str(stored.source), **stored.run.summary()}
+    print_json(options, document)
     print_results(stored.run, folder)

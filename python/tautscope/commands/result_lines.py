@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.dof import NamedDof
-
-if TYPE_CHECKING:
-    from tautscope.report.operator_motion import OperatorResult
-    from tautscope.report.recorded_run import RecordedRun
-    from tautscope.report.results import DofResult
+from tautscope.report.operator_motion import OperatorResult
+from tautscope.report.recorded_run import RecordedRun
+from tautscope.report.results import DofResult
 
 
 def result_lines(run: RecordedRun) -> list[str]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from tautscope.commands.article_config import article_config
-from tautscope.config import Config, Profile, load_config
+from tautscope.commands.arguments import article_config
+from tautscope.config import Config, load_config
 from tautscope.config.placeholders import refuse_placeholders
+from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import ConfigError, FieldError
 from tautscope.loop.rig import Rig
 from tautscope.runs.rigs import rig_maker
@@ -53,12 +54,21 @@ def choose_rig(
     elif rig is not None:
         make = rig_maker(rig)
     else:
-        return _article_rig(options.config, profile, is_twin=bool(is_twin))
+        config = article_config(options.config, profile)
+        if is_twin:
+            from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
+
+            return config.replace(drives=None), LiveTwin
+        from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
+
+        if options.config is None or config.drives is None:
+            allowed = "a section [drives], or another rig by an option: --help"
+            raise ConfigError("drives", None, allowed)
+        refuse_placeholders(options.config)
+        return config, HardwareRig
     config = load_config(options.config or robot, profile)
     if not in_real_time:
         return config, make
-    from tautscope.console.paced_rig import PacedRig  # noqa: PLC0415
-
     period = config.control.period
     return config, lambda used: PacedRig(lambda: make(used), period, is_simulated=bool(is_twin))
 
@@ -66,19 +76,3 @@ def choose_rig(
 def rig_in_words(options: argparse.Namespace) -> str:
     """The rig of ``--twin``, ``--rig`` or the drives, for messages."""
     return "the twin" if options.twin else f"REAL MOTORS of {options.rig or options.config}"
-
-
-def _article_rig(
-    path: str | None, profile: Profile | None, *, is_twin: bool
-) -> tuple[Config, Callable[[Config], Rig]]:
-    config = article_config(path, profile)
-    if is_twin:
-        from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
-
-        return config.replace(drives=None), LiveTwin
-    from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
-
-    if path is None or config.drives is None:
-        raise ConfigError("drives", None, "a section [drives], or another rig by an option: --help")
-    refuse_placeholders(path)
-    return config, HardwareRig

@@ -5,18 +5,20 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import confirm_motion
-from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import announce, print_json
+from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.result_lines import print_results
 from tautscope.config import Config
+from tautscope.hardware.signals import exit_on_signals
 from tautscope.loop.rig import Rig
-
-if TYPE_CHECKING:
-    from tautscope.runs.recording import Recording
+from tautscope.report.operator_motion import motion_of
+from tautscope.report.recorded_run import RecordedRun
+from tautscope.report.run_folder import write_report
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.output_folder import recording_saved
+from tautscope.runs.recording import Recording
 
 DURATION = 120.0
 """Duration of each of the two runs [s]."""
@@ -46,13 +48,7 @@ def run(
 
     The logs are written during the runs; also after SIGTERM and SIGHUP the rig is closed.
     """
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
     from tautscope.log.writer import run_log  # noqa: PLC0415
-    from tautscope.report.operator_motion import motion_of  # noqa: PLC0415
-    from tautscope.report.recorded_run import RecordedRun  # noqa: PLC0415
-    from tautscope.report.run_folder import write_report  # noqa: PLC0415
-    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
     motion = motion_of(config, seed, options.seconds or DURATION)
@@ -78,7 +74,5 @@ def run(
     found = RecordedRun(runs[1], runs[0])
     write_report(found, folder, {"rig": name})
     (folder / "run.json").write_text(json.dumps(found.summary(), indent=1), encoding="utf-8")
-    if options.json:
-        print_json({"folder": str(folder), **found.summary()})
-        return
+    print_json(options, {"folder": str(folder), **found.summary()})
     print_results(found, folder)

@@ -7,16 +7,17 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_yes, confirm_motion
+from tautscope.commands.printing import progress_bar
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
 from tautscope.config import Config
 from tautscope.errors import CalibrationError, ConfigError
 
 if TYPE_CHECKING:
-    from tautscope.calibration.result import CalibrationResult
     from tautscope.calibration.robot import RobotFit
 
 SYSTEMATIC = 0.01
@@ -72,7 +73,6 @@ def run_latency(options: argparse.Namespace) -> int:
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
     from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     config, make = choose_rig(options)
     if not config.dof:
@@ -90,7 +90,6 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
 
 def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
     """The fit in the form that all calibrations have; of ``latency`` the delays alone."""
-    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
     from tautscope.calibration.robot.motor_map import motor_map  # noqa: PLC0415
     from tautscope.calibration.robot.parameters import with_values  # noqa: PLC0415
 

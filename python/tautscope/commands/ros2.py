@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_now
+from tautscope.commands.printing import print_json
 from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in_words
 from tautscope.config import load_config
 from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
+from tautscope.ros2.inputs import JoyAxes
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -87,7 +88,6 @@ def _ros2(options: argparse.Namespace) -> int:
     if not (options.driver or options.rig):
         require_extras("tautscope ros2", ["twin" if options.twin else "hardware"])
     from tautscope.hardware.realtime import OTHERS, realtime  # noqa: PLC0415
-    from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
 
@@ -120,11 +120,16 @@ def _ros2(options: argparse.Namespace) -> int:
             make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
-            on_result=lambda text: print_now(options.json, "result", text, text),
+            on_result=lambda text: _print_now(options, "result", text, text),
         )
 
 
 def _announce(options: argparse.Namespace, name: str) -> None:
     what = "a driver in ROS" if options.driver else rig_in_words(options)
     text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
-    print_now(options.json, "node", name, text)
+    _print_now(options, "node", name, text)
+
+
+def _print_now(options: argparse.Namespace, key: str, value: str, text: str) -> None:
+    print_json(options, {key: value})
+    print(text, flush=True)

@@ -5,16 +5,12 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.hardware.doctor.computer import check_computer
 from tautscope.log.header import software_versions
-
-if TYPE_CHECKING:
-    from tautscope.hardware.doctor.check_result import CheckResult
 
 BENDS = (0, 90, 180, 360)
 """Bends of the desktop rig's channel [degrees]."""
@@ -83,19 +79,13 @@ def write_environment(options: argparse.Namespace, config: Config, folder: Path)
         config: Of the run.
         folder: That of the run.
     """
-    from tautscope.hardware.doctor.computer import check_computer  # noqa: PLC0415
-
     facts = {
         "protocol": options.protocol,
         "bend": options.bend,
         "recorded": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "software": software_versions(),
-        "computer": _found(check_computer(config)),
+        "computer": {check.what: check.found for check in check_computer(config)},
     }
     (folder / ENVIRONMENT).write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     text = _ABOUT.format(environment=ENVIRONMENT)
     (folder / "README.txt").write_text(text, encoding="utf-8")
-
-
-def _found(checks: Iterable[CheckResult]) -> dict[str, str]:
-    return {check.what: check.found for check in checks}

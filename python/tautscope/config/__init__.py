@@ -8,19 +8,10 @@ that no publication describes. Missing keys have their defaults.
 from tautscope.config.actuators import ActuatorsConfig
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig, TopicConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
-from tautscope.config.camera import (
-    CameraConfig,
-    PixelFormat,
-    PoseConfig,
-    SourceConfig,
-)
-from tautscope.config.control import ControlConfig
-from tautscope.config.dof import DofConfig
+from tautscope.config.camera import CameraConfig, PixelFormat, PoseConfig, SourceConfig
+from tautscope.config.control import ControlConfig, DofConfig, EstimationConfig, LawConfig
 from tautscope.config.drives import AxisConfig, DrivesConfig
-from tautscope.config.estimation import EstimationConfig
-from tautscope.config.experiment import ExperimentConfig, Sine
-from tautscope.config.instrument import InstrumentConfig
-from tautscope.config.law import LawConfig
+from tautscope.config.experiment import ExperimentConfig, InstrumentConfig, Sine
 from tautscope.config.load import RIGS, axes, config_file, dump_config, load_config
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document

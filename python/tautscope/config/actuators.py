@@ -9,7 +9,8 @@ import numpy as np
 
 from tautscope.config.axes import DofEntry, Name
 from tautscope.config.drives import DrivesConfig
-from tautscope.config.section import Section, relation
+from tautscope.config.fields import LIMITS
+from tautscope.config.section import Section, require
 from tautscope.errors import ConfigError
 
 
@@ -35,26 +36,21 @@ class ActuatorsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
     """In place of matrix and offsets: "module:function" of yours from command to motors, or
     "module:Class" with motors(dofs) and, if motors are reported, dofs(motors)."""
 
-
-@relation(ActuatorsConfig)
-def _check_actuators(actuators: ActuatorsConfig) -> None:
-    if bool(actuators.matrix) == bool(actuators.map):
-        found = "both" if actuators.map else "neither"
-        raise ConfigError("matrix", found, "either matrix or map")
-    if actuators.map and actuators.offsets:
-        raise ConfigError("offsets", actuators.offsets, "no offsets with map: it has its own")
-    given = {name: getattr(actuators, name) for name in ("offsets", "limits", "names", "units")}
-    count = len(actuators.matrix) or max(map(len, given.values()))
-    for name, values in given.items():
-        if values and len(values) != count:
-            raise ConfigError(name, values, f"{count} values, one per motor")
-    for index, (low, high) in enumerate(actuators.limits):
-        if not low < high:
-            allowed = "the lower limit, then the upper"
-            raise ConfigError(f"limits[{index}]", (low, high), allowed)
-    for index, name in enumerate(actuators.names):
-        if name in actuators.names[:index]:
-            raise ConfigError(f"names[{index}]", name, "a name used once")
+    def _check(self) -> None:
+        found = "both" if self.map else "neither"
+        require(bool(self.matrix) != bool(self.map), "matrix", found, "either matrix or map")
+        allowed = "no offsets with map: it has its own"
+        require(not (self.map and self.offsets), "offsets", self.offsets, allowed)
+        given = {name: getattr(self, name) for name in ("offsets", "limits", "names", "units")}
+        count = len(self.matrix) or max(map(len, given.values()))
+        for key, values in given.items():
+            is_whole = not values or len(values) == count
+            require(is_whole, key, values, f"{count} values, one per motor")
+        for index, limits in enumerate(self.limits):
+            require(limits[0] < limits[1], f"limits[{index}]", limits, LIMITS)
+        for index, name in enumerate(self.names):
+            is_new = name not in self.names[:index]
+            require(is_new, f"names[{index}]", name, "a name used once")
 
 
 def check_motors(

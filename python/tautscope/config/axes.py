@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from tautscope._core import MOST_RANGE, SPEED
-from tautscope.config.fields import Gain, NonNegative, Positive, Vector3
-from tautscope.config.section import Section
+from tautscope.config.fields import LIMITS, Gain, NonNegative, Positive, Vector3
+from tautscope.config.section import Section, require, require_at_most
 
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
 
@@ -71,6 +71,20 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def display_scale(self) -> float:
         """Factor from m or rad to `display_unit`."""
         return 1e3 if self.unit == "m" else 1.0
+
+    def _check(self) -> None:
+        if self.range is not None:
+            low, high = self.range
+            require(low < high, "range", self.range, LIMITS)
+            most = MOST_RANGE * self.width_limit
+            degrees = "; in m and rad, not mm and degrees" if high - low > most else ""
+            require(not degrees, "range", self.range, f"at most {most:.3g} wide{degrees}")
+        if self.unit == "m":  # a slack of more than a metre is one in millimetres
+            require(self.width_limit <= 1, "width_limit", self.width_limit, "at most 1 m")
+            require(self.largest_speed <= 10, "speed", self.largest_speed, "at most 10 m/s")
+        if self.expected_width is not None:
+            require_at_most("", self, "expected_width", "width_limit")
+        require_at_most("", self, "delta_minus", "delta_plus")
 
 
 class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -7,8 +7,7 @@ from datetime import datetime
 from msgspec import field
 
 from tautscope.config.fields import NonNegative, Positive
-from tautscope.config.section import Section, relation
-from tautscope.errors import ConfigError
+from tautscope.config.section import Section, require
 
 CALIBRATIONS = ("camera", "colour", "geometry", "latency")
 """The calibrations in the order in which they build on each other."""
@@ -31,6 +30,13 @@ class CalibrationRecord(Section, frozen=True, forbid_unknown_fields=True, kw_onl
         """The date."""
         return datetime.fromisoformat(self.date)
 
+    def _check(self) -> None:
+        try:
+            is_valid = self.at.tzinfo is not None
+        except ValueError:
+            is_valid = False
+        require(is_valid, "date", self.date, "a time with zone: 2026-11-22T12:00:00+00:00")
+
 
 class CalibrationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The calibrations of a rig; ``tautscope doctor`` checks them, no loop reads them."""
@@ -47,13 +53,3 @@ class CalibrationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     """Delay between motors and images, or of the sensors of a robot with [[dof]]."""
     robot: CalibrationRecord | None = None
     """Kinematics and delays of a robot with [[dof]]."""
-
-
-@relation(CalibrationRecord)
-def _check_record(record: CalibrationRecord) -> None:
-    try:
-        is_valid = datetime.fromisoformat(record.date).tzinfo is not None
-    except ValueError:
-        is_valid = False
-    if not is_valid:
-        raise ConfigError("date", record.date, "a time with zone: 2026-11-22T12:00:00+00:00")

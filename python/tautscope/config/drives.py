@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import Fraction, Positive
-from tautscope.config.section import Section
+from tautscope.config.fields import LIMITS, Fraction, Positive
+from tautscope.config.microcontroller import MOST_AXES, PROTOCOL, SERIAL_PORTS
+from tautscope.config.section import Section, require, require_at_most, require_defaults
+from tautscope.config.servos import PORTS, models_of
 from tautscope.dof import Dof, Motor, NamedMotor
 
 Preset = Literal["copley", "elmo_gold", "elmo_whistle", "epos4"]
-"""Makers' drives, see `tautscope.config.presets`."""
+"""Makers' drives, see `tautscope.config.drive_defaults`."""
 Waiver = Literal[
     "1016", "1017", "6007", "6041.12", "6041.13", "605A", "6061", "607D", "607F", "60C2", "6502"
 ]
@@ -30,6 +33,20 @@ WAIVERS: dict[Waiver, str] = {
     "6502": "its manual says that it has mode 8 or 7",
 }
 """When each waiver is right; it completes "if ..." in messages."""
+
+_OF_CIA_402 = (
+    "interface",
+    "options",
+    "lead_points",
+    "master_node",
+    "heartbeat_period",
+    "preset",
+    "interpolation_time",
+    "waive",
+)
+"""Keys of [drives] that only CiA 402 drives use."""
+_OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
+"""Keys of a motor that only servos use."""
 
 
 def waiver_hint(waiver: Waiver) -> str:
@@ -157,3 +174,70 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Settings of one motor."""
         own = self.motors or {dof.label: getattr(self, dof.label) for dof in Dof}
         return own[motor.label]
+
+    def _check(self) -> None:
+        """Also the ranges that CANopen can express."""
+        given = [dof.label for dof in Dof if getattr(self, dof.label) is not None]
+        if self.motors:
+            require(not given, "motors", list(self.motors), f"either motors or {', '.join(given)}")
+        for dof in () if self.motors else Dof:
+            allowed = "a motor, or motors of [[dof]] in [drives.motors]"
+            require(dof.label in given, dof.label, None, allowed)
+        taken = {self.master_node: "master_node"}
+        for motor in self.all_motors:
+            axis, path = self[motor], motor.key.removeprefix("drives.")
+            owner = taken.get(axis.node)
+            require(owner is None, f"{path}.node", axis.node, f"not that of {owner}")
+            taken[axis.node] = motor.label
+            require(axis.travel[0] < axis.travel[1], f"{path}.travel", axis.travel, LIMITS)
+            require(
+                max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,
+                f"{path}.counts_per_unit",
+                axis.counts_per_unit,
+                f"less than 2^31 counts from home = {axis.home} to both ends of travel = "
+                f"{axis.travel}",
+            )
+            require_at_most(path, axis, "following_window", "following_error")
+            if self.protocol in PORTS:
+                allowed = "one of " + ", ".join(models_of(self.protocol))
+                known = axis.model in models_of(self.protocol)
+                require(known, f"{path}.model", axis.model, allowed)
+                lower, upper = axis.stops or (-math.inf, math.inf)
+                inside = lower <= axis.travel[0] and axis.travel[1] <= upper
+                require(inside, f"{path}.travel", axis.travel, f"within stops = {axis.stops}")
+            else:
+                require_defaults(axis, path, _OF_SERVOS, "only servos use it")
+            if self.protocol in SERIAL_PORTS:
+                require_defaults(axis, path, ("eds",), "only CiA 402 drives use it")
+            if self.protocol == PROTOCOL:
+                allowed = f"an axis of the microcontroller, 1 to {MOST_AXES}"
+                require(axis.node <= MOST_AXES, f"{path}.node", axis.node, allowed)
+            require(
+                axis.speed_limit * self.cycle * axis.counts_per_unit >= 1,
+                f"{path}.counts_per_unit",
+                axis.counts_per_unit,
+                "at least one count per cycle at the speed limit; per m or rad, not mm or deg",
+            )
+        if self.protocol in SERIAL_PORTS:
+            require_defaults(self, "", _OF_CIA_402, "only CiA 402 drives use it")
+        else:
+            require(self.bitrate <= 1_000_000, "bitrate", self.bitrate, "at most 1000000 on CAN")
+        for name, most in (
+            ("cycle", 0.255),
+            ("heartbeat_period", 65.535),
+            ("heartbeat_timeout", 65.535),
+            ("following_timeout", 65.535),
+        ):
+            value = getattr(self, name)
+            is_whole = math.isclose(value * 1e3, round(value * 1e3))
+            allowed = f"whole milliseconds, 0.001 to {most}"
+            require(0.001 <= value <= most and is_whole, name, value, allowed)
+        reply, cycle = self.reply_timeout, self.cycle
+        require(reply < cycle, "reply_timeout", reply, f"less than cycle = {cycle}")
+        least = 2 * max(self.heartbeat_period, cycle)
+        require(
+            self.heartbeat_timeout >= least,
+            "heartbeat_timeout",
+            self.heartbeat_timeout,
+            f"at least {least}: two heartbeats and two cycles",
+        )

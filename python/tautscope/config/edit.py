@@ -98,10 +98,10 @@ def _set(place: Any, key: str, value: Any) -> None:
     if isinstance(value, dict):
         table: Any = tomlkit.table() if isinstance(place, Table) else tomlkit.inline_table()
         for name, item in value.items():
-            table[name] = _inline(item)
+            table[name] = inline(item)
         place[key] = table
         return
-    place[key] = _inline(value)
+    place[key] = inline(value)
     item = place.item(key) if hasattr(place, "item") else place[key]
     if isinstance(item, Item) and MARK in item.trivia.comment:
         comment = _PLACEHOLDER.sub("", item.trivia.comment)
@@ -110,7 +110,8 @@ def _set(place: Any, key: str, value: Any) -> None:
         item.trivia.comment_ws = "" if is_empty else item.trivia.comment_ws
 
 
-def _inline(value: Any) -> Any:
+def inline(value: Any) -> Any:
+    """A value as tomlkit writes it in one line."""
     if isinstance(value, dict):
         table = tomlkit.inline_table()
         table.update(value)

@@ -1,4 +1,4 @@
-"""Configuration of the article's experiment."""
+"""The article's instrument and experiment."""
 
 from __future__ import annotations
 
@@ -6,9 +6,33 @@ from typing import Annotated
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import Positive
-from tautscope.config.section import Section
+from tautscope.config.fields import NonNegative, Positive
+from tautscope.config.section import Section, require
 from tautscope.dof import Dof
+
+
+class InstrumentConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Dimensions of the instrument, Fig. 4. All [geometry]."""
+
+    diameter: Positive = 3.5e-3
+    """Outer diameter of shaft, section and tip [m]."""
+    bending_length: Positive = 18.5e-3
+    """Length of the bending section [m]."""
+    tip_length: Positive = 20e-3
+    """Length of the rigid tip [m]."""
+    marker_a: NonNegative = 4e-3
+    """Centre of the proximal band A, from the distal end of the bending section [m]."""
+    marker_b: NonNegative = 16e-3
+    """Centre of the distal band B, from the distal end of the bending section [m]."""
+    band_length: Positive = 4e-3
+    """Length of each band along the axis [m]."""
+
+    def _check(self) -> None:
+        """Both bands are on the tip, one behind the other."""
+        a, b, half = self.marker_a, self.marker_b, self.band_length / 2
+        proximal = "a band on the tip, proximal of marker_b's band and not overlapping it"
+        require(half <= a <= b - 2 * half, "marker_a", a, proximal)
+        require(b + half <= self.tip_length, "marker_b", b, "a band within tip_length")
 
 
 class Sine(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Types of numbers that several blocks share."""
+"""Types and ranges of numbers that several sections share."""
 
 from typing import Annotated
 
@@ -11,3 +11,8 @@ Gain = Annotated[float, Meta(ge=1, le=50)]
 Vector3 = tuple[float, float, float]
 PerDof = tuple[Positive, Positive, Positive]
 """One each for insertion, rotation and bending."""
+LIMITS = "the lower limit, then the upper"
+"""What a pair of limits is, for errors."""
+MOST_RATIO = 30.0
+"""Largest ratio of a number to its default, in either direction. Robots differ by less; a wrong
+unit (mm for m, degrees for rad) or a digit too many is more."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import msgspec
@@ -44,17 +45,12 @@ def allowed_values(kind: types.Type) -> str:
 
 def allowed_at(kind: Any, keys: Sequence[str]) -> str:
     """The allowed values at a path of keys and indices within an annotation."""
-    place = types.type_info(kind)
-    for key in keys:
-        place = _member(place, key)
-    return allowed_values(place)
+    return allowed_values(reduce(_member, keys, types.type_info(kind)))
 
 
 def wrong_entry(kind: Any, keys: Sequence[str], entries: Any) -> str | None:
     """The first key of a table of sections whose section is wrong; the table is at a path."""
-    place = types.type_info(kind)
-    for key in keys:
-        place = _member(place, key)
+    place = reduce(_member, keys, types.type_info(kind))
     if not isinstance(place, types.DictType) or not isinstance(place.value_type, types.StructType):
         return None
     for name, entry in entries.items():

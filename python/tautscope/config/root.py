@@ -13,19 +13,13 @@ from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
 from tautscope.config.checks import check_axes, check_ranges, check_references, check_topics
-from tautscope.config.control import ControlConfig
-from tautscope.config.dof import DofConfig
+from tautscope.config.control import ControlConfig, DofConfig, EstimationConfig, LawConfig
+from tautscope.config.drive_defaults import with_drive_defaults
 from tautscope.config.drives import DrivesConfig
-from tautscope.config.estimation import EstimationConfig
-from tautscope.config.experiment import ExperimentConfig
-from tautscope.config.instrument import InstrumentConfig
-from tautscope.config.law import LawConfig
-from tautscope.config.microcontroller import with_axis_defaults
-from tautscope.config.presets import with_preset
+from tautscope.config.experiment import ExperimentConfig, InstrumentConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, converted_value, without_numpy
-from tautscope.config.servos import with_servo_defaults
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
 from tautscope.dof import Dof, NamedDof
@@ -84,8 +78,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     actuators: ActuatorsConfig | None = None
     """Motors that are not the degrees of freedom."""
 
-    def __post_init__(self) -> None:
-        Section.__post_init__(self)
+    def _check(self) -> None:
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
         check_axes(self.dof, self.kinematics, self.safety)
         check_ranges(self)
@@ -142,8 +135,7 @@ def from_document(document: dict[str, Any]) -> Config:
 def _checked(document: dict[str, Any]) -> Config:
     document = _merged(to_document(Config()), without_numpy(document))
     if isinstance(document.get("drives"), dict):
-        drives = with_preset(with_servo_defaults(document["drives"]))
-        document["drives"] = with_axis_defaults(drives)
+        document["drives"] = with_drive_defaults(document["drives"])
     config: Config = converted_value("", document, Config)
     return config
 

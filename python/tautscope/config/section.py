@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import cache
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, get_type_hints
 
 import msgspec
 from msgspec import Struct
 
 from tautscope.errors import ConfigError
-
-S = TypeVar("S")
-_relations: dict[type, Callable[[Any], None]] = {}
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -33,9 +30,10 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
             converted = converted_value(name, value, kind)
             if converted is not value:
                 msgspec.structs.force_setattr(self, name, converted)
-        check = _relations.get(type(self))
-        if check is not None:
-            check(self)
+        self._check()
+
+    def _check(self) -> None:
+        """Check relations between the values; the key in an error is relative to the section."""
 
     def __repr__(self) -> str:
         """A call that makes an equal section: the profile, and values that are not defaults."""
@@ -54,17 +52,31 @@ def default_of(field: msgspec.structs.FieldInfo) -> Any:
     return field.default_factory()
 
 
-def relation(section: type[S]) -> Callable[[Callable[[S], None]], Callable[[S], None]]:
-    """Register a function that checks the relations between the values of a section.
+def require(is_valid: bool, field: str, value: object, allowed: str) -> None:
+    """Raise a `ConfigError` if a value is not valid."""
+    if not is_valid:
+        raise ConfigError(field, value, allowed)
 
-    It raises `ConfigError` with the key relative to the section.
-    """
 
-    def register(check: Callable[[S], None]) -> Callable[[S], None]:
-        _relations[section] = check
-        return check
+def require_defaults(block: Section, path: str, names: Sequence[str], why: str) -> None:
+    """Refuse keys that have another value than their default."""
+    defaults = {one.name: default_of(one) for one in msgspec.structs.fields(block)}
+    for name in names:
+        value, field = getattr(block, name), f"{path}.{name}".lstrip(".")
+        require(value == defaults[name], field, value, f"its default: {why}")
 
-    return register
+
+def require_names(field: str, names: Sequence[str], allowed: Sequence[str]) -> None:
+    """Refuse a list with other names than the allowed ones."""
+    for index, name in enumerate(names):
+        require(name in allowed, f"{field}[{index}]", name, "one of " + ", ".join(allowed))
+
+
+def require_at_most(path: str, block: Section, name: str, limit_name: str) -> None:
+    """Refuse a value above that of another key."""
+    value, limit = getattr(block, name), getattr(block, limit_name)
+    field = f"{path}.{name}".lstrip(".")
+    require(value <= limit, field, value, f"at most {limit_name} = {limit}")
 
 
 def converted_value(path: str, value: Any, kind: Any) -> Any:

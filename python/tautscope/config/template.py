@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Collection, Iterator
-from typing import Any
 
 import tomlkit
 
 from tautscope.config.descriptions import keys, package_text, section_text
+from tautscope.config.edit import inline
 from tautscope.config.placeholders import MARK
 from tautscope.config.root import Config
 from tautscope.config.section import Section
@@ -57,18 +57,10 @@ def _section(
             yield f"{sign}{key.name} = ...  # required" if key.is_required else f"# {key.name} ="
         else:
             mark = f"  # {MARK}" if place in marked else ""
-            yield f"{sign}{key.name} = {_toml(value)}{mark}"
+            yield f"{sign}{key.name} = {tomlkit.item(inline(value)).as_string()}{mark}"
 
 
 def _comment(text: str, sign: str) -> Iterator[str]:
     for paragraph in text.split("\n\n"):
         for line in textwrap.wrap(paragraph, _WIDTH - len(sign)):
             yield f"{sign}# {line}"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        table = tomlkit.inline_table()
-        table.update(value)
-        return table.as_string()
-    return str(tomlkit.item(list(value) if isinstance(value, tuple) else value).as_string())

@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta, field
 
 from tautscope.config.fields import NonNegative, Positive, Vector3
-from tautscope.config.section import Section
+from tautscope.config.section import Section, require, require_at_most, require_names
 
 Slope = Annotated[float, Meta(gt=-1, lt=1)]
 
@@ -183,3 +183,14 @@ class TwinConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     transmission: TransmissionConfig = field(default_factory=TransmissionConfig)
     drives: DriveConfig = field(default_factory=DriveConfig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
+
+    def _check(self) -> None:
+        require_at_most("", self, "latency_jitter", "latency")
+        require_names("disturb", self.disturb, DISTURBANCES)
+        readout, frame_period = self.sensor.readout, 1 / self.frame_rate
+        require(
+            readout <= frame_period,
+            "sensor.readout",
+            readout,
+            f"at most one frame period, {frame_period:.3g}",
+        )

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import shlex
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.calibration.images import to_bgr
 from tautscope.console import messages as msg
 from tautscope.console.programs import PROGRAMS, programs_of
 from tautscope.console.rig_control import RigControl
-from tautscope.console.stills import Image, write_still
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
 
@@ -23,7 +28,9 @@ class Actions:
         newest_image: Returns the newest image, if there is one.
     """
 
-    def __init__(self, control: RigControl, newest_image: Callable[[], Image | None]) -> None:
+    def __init__(
+        self, control: RigControl, newest_image: Callable[[], NDArray[np.uint8] | None]
+    ) -> None:
         self._control = control
         self._newest_image = newest_image
         self._takes = self._stills = 0
@@ -166,7 +173,12 @@ class Actions:
             return "there is no image"
         self._stills += 1
         path = self._control.folder / f"still-{self._stills}.png"
-        write_still(path, image.copy(), self._control.config.camera.pixel_format)
+        pixels, kind = image.copy(), self._control.config.camera.pixel_format
+
+        def write() -> None:
+            cv2.imwrite(str(path), to_bgr(pixels, kind))
+
+        threading.Thread(target=write, name="still").start()  # takes longer than a tick
         self._text = f"the image is in {path}"
         return ""
 

@@ -8,21 +8,26 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
+import cv2
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from tautscope.calibration.images import to_bgr
 from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.shared import Channels, ImageChannel
 from tautscope.console.state import Layout
-from tautscope.console.stills import encode_jpeg
 
 POLL_PERIOD = 0.004
 """Time between two looks into the shared memory [s]."""
 IN_FLIGHT = 2
 """Images that a page has been sent and has not drawn yet, at most."""
+JPEG_QUALITY = 80
 
 
 class StateFeed:
@@ -194,3 +199,13 @@ class ImageFeed:
     def remove(self, connection: ServerConnection) -> None:
         """Forget a page."""
         self._viewers.pop(connection, None)
+
+
+def encode_jpeg(image: NDArray[np.uint8], pixel_format: PixelFormat, width: float) -> bytes:
+    """An image as JPEG, for the page; halved while that leaves at least `width` pixels across."""
+    pixels: NDArray[Any] = to_bgr(image, pixel_format)
+    while pixels.shape[1] // 2 >= max(width, 1):
+        size = pixels.shape[1] // 2, pixels.shape[0] // 2
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    options = (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY)
+    return cv2.imencode(".jpg", pixels, options)[1].tobytes()

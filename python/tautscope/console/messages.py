@@ -159,7 +159,7 @@ class Received(Struct, frozen=True, tag=True):
 
     client: int
     at: float
-    message: Take | Seek | Servo | Action | Setting | SetProfile | Stop
+    message: ControlMessage
 
 
 class Gone(Struct, frozen=True, tag=True):
@@ -188,9 +188,4 @@ encode = msgspec.json.Encoder().encode
 decode_received = msgspec.json.Decoder(Received).decode
 decode_inbound = msgspec.json.Decoder(Received | Gone).decode
 decode_reply = msgspec.json.Decoder(Reply).decode
-
-
-def decode_state(data: bytes) -> dict[str, Any]:
-    """The state of `tautscope.console.state.State` as a dictionary."""
-    state: dict[str, Any] = msgspec.json.decode(data)
-    return state
+decode_state = msgspec.json.Decoder(dict[str, Any]).decode

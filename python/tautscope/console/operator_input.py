@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.console.lease import Lease
 from tautscope.console.messages import Received, Servo
-from tautscope.console.motion_limits import motion_limits
 from tautscope.console.pointing import Point, Pointing
-from tautscope.console.programs import Program
+from tautscope.console.programs import Program, motion_limits
 
 Floats = NDArray[np.float64]
 COMMAND_TIMEOUT = 0.1

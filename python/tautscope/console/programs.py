@@ -1,35 +1,61 @@
-"""Motions that run by themselves while the operator's page is present."""
+"""How far an operator may move the reference, and motions that run by themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.console.motion_limits import motion_limits
-from tautscope.loop.references import MINIMUM_JERK_PEAK, Motion, SineSequence
+from tautscope.dof import Dof
+from tautscope.loop.references import Motion, Move, SineSequence
 
 Floats = NDArray[np.float64]
+LEAST_TIME = 0.1
+"""Shortest duration of a move to the start [s]."""
 MOVE_SPEED = 0.25
 """Peak speed of a move to the start [of the largest speed that the loop follows]."""
+TRAVEL_MARGIN = 0.25
+"""Distance of reference and command from the travel [in width_limit], but at most a quarter of the
+travel."""
+TWIN_TRAVEL = 4 / 3
+"""Travel of the reference in the twin about the start position [in amplitudes]."""
 
 
-class Move:
-    """A minimum-jerk move of all DOFs between two positions (n,) [m or rad].
+class MotionLimits(NamedTuple):
+    """Limits of the reference; every (n,) is [m or rad], or that per s.
 
-    u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5), x = time / duration, as fast as `speed` (n,) allows.
+    Attributes:
+        speed: (n,) largest speed that the loop follows.
+        least: (n,) least reference.
+        most: (n,) largest reference.
+        start: (n,) where the program "home" ends.
     """
 
-    def __init__(self, start: Floats, end: Floats, speed: Floats) -> None:
-        self._start, self._travel = start.copy(), end - start
-        self.duration = float(max(MINIMUM_JERK_PEAK * np.max(np.abs(self._travel) / speed), 0.1))
+    speed: Floats
+    least: Floats
+    most: Floats
+    start: Floats
 
-    def __call__(self, time: float) -> Floats:
-        """(n,) [m or rad] at `time` [s from its start]."""
-        x = min(max(time / self.duration, 0.0), 1.0)
-        return self._start + self._travel * x**3 * (10 - 15 * x + 6 * x**2)
+
+def motion_limits(config: Config) -> MotionLimits:
+    """The limits in a configuration."""
+    if config.dof:
+        speed = np.array([dof.largest_speed for dof in config.dof])
+        widths = np.array([dof.width_limit for dof in config.dof])
+        travel = np.array([dof.travel for dof in config.dof])
+        start = travel.mean(axis=1)
+    else:
+        speed, widths = np.array(config.safety.reference_speed), np.array(config.safety.width_limit)
+        start = np.array([config.experiment[dof].centre for dof in Dof])
+        if config.drives is None:
+            reach = TWIN_TRAVEL * np.array([config.experiment[dof].amplitude for dof in Dof])
+            return MotionLimits(speed, start - reach, start + reach, start)
+        travel = np.array([config.drives[dof].travel for dof in Dof])
+    margin = np.minimum(TRAVEL_MARGIN * widths, np.diff(travel)[:, 0] / 4)
+    return MotionLimits(speed, travel[:, 0] + margin, travel[:, 1] - margin, start)
 
 
 class Program:
@@ -82,7 +108,7 @@ def sweep(config: Config, reference: Floats) -> Program:
 
 def _move_to_start(config: Config, reference: Floats) -> Move:
     limits = motion_limits(config)
-    return Move(reference, limits.start, MOVE_SPEED * limits.speed)
+    return Move(reference, limits.start, MOVE_SPEED * limits.speed, LEAST_TIME)
 
 
 PROGRAMS: dict[str, Callable[[Config, Floats], Program]] = {

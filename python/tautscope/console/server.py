@@ -7,13 +7,14 @@ process cannot move anything by itself: without fresh commands motion stops.
 from __future__ import annotations
 
 import asyncio
+import hmac
 import signal
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from http import HTTPStatus
 from multiprocessing import parent_process
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from websockets.asyncio.server import Server as WebSocketServer
@@ -23,10 +24,10 @@ from websockets.http11 import Request, Response
 
 from tautscope.console import messages as msg
 from tautscope.console.access import (
+    ADDRESS,
     LARGEST_CONNECTIONS,
     LARGEST_MESSAGE,
     TOKEN_TIME,
-    Access,
     RateLimit,
 )
 from tautscope.console.feeds import ImageFeed, StateFeed
@@ -35,6 +36,7 @@ from tautscope.console.shared import Channels, SharedMemory
 
 CONTROL, VIDEO = "/control", "/video"
 POLICY_VIOLATION = 1008
+Message = TypeVar("Message")
 
 
 def run_server(memory: SharedMemory, token: str, sockets: list[Any]) -> None:
@@ -56,8 +58,10 @@ class Server:
 
     def __init__(self, channels: Channels, memory: SharedMemory, token: str, port: int) -> None:
         self._channels = channels
-        self._access = Access(token, port)
-        self._pages = Pages(self._access.hosts)
+        self._token = token.encode()
+        self._hosts = [f"{name}:{port}" for name in (ADDRESS, "localhost")]
+        self._origins = [f"http://{host}" for host in self._hosts]
+        self._pages = Pages(self._hosts)
         self._images = ImageFeed(channels.images, memory.pixel_format)
         self._states = StateFeed(channels, memory.layout, lambda: self._images.latency)
         self._connections = self._clients = 0
@@ -74,7 +78,7 @@ class Server:
         """Serve during the block."""
         options: dict[str, Any] = {
             "process_request": self._process_request,
-            "origins": self._access.origins,
+            "origins": self._origins,
             "compression": None,
             "max_size": LARGEST_MESSAGE,
             "max_queue": 64,
@@ -95,7 +99,8 @@ class Server:
 
     def _process_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer requests for pages; None lets the connection become a socket."""
-        if not self._access.is_host(request.headers.get_all("Host")):
+        hosts = request.headers.get_all("Host")
+        if len(hosts) != 1 or hosts[0] not in self._hosts:
             return self._pages.plain(HTTPStatus.FORBIDDEN, "Forbidden")
         # Older versions of websockets refuse other methods themselves.
         if getattr(request, "method", "GET") != "GET":
@@ -104,7 +109,7 @@ class Server:
             return self._pages.response(request.path)
         if self._connections >= LARGEST_CONNECTIONS:
             return self._pages.plain(HTTPStatus.SERVICE_UNAVAILABLE, "Too many connections")
-        if request.headers.get("Origin") not in self._access.origins:
+        if request.headers.get("Origin") not in self._origins:
             return self._pages.plain(HTTPStatus.FORBIDDEN, "Forbidden")
         return None
 
@@ -128,49 +133,46 @@ class Server:
                 hello = msg.decode_hello(await connection.recv())
         except (TimeoutError, msgspec.MsgspecError, UnicodeError):
             return False
-        return self._access.is_token(hello.token)
+        return hmac.compare_digest(hello.token.encode(), self._token)
+
+    async def _messages(
+        self, connection: ServerConnection, decode: Callable[[str | bytes], Message]
+    ) -> AsyncIterator[Message]:
+        """The messages of a page; what is malformed, or too many, ends its connection."""
+        limit = RateLimit(time.monotonic())
+        async for data in connection:
+            try:
+                message = decode(data)
+            except (msgspec.MsgspecError, UnicodeError):
+                await connection.close(POLICY_VIOLATION, "malformed message")
+                return
+            if not isinstance(message, msg.Stop) and not limit.allows(time.monotonic()):
+                await connection.close(POLICY_VIOLATION, "too many messages")
+                return
+            yield message
 
     async def _serve_control(self, connection: ServerConnection) -> None:
         self._clients += 1
-        client = self._clients
+        client, channels = self._clients, self._channels
         sending = asyncio.create_task(self._states.send(connection, client))
-        limit = RateLimit(time.monotonic())
         try:
-            async for data in connection:
-                now = time.monotonic()
-                try:
-                    message = msg.decode_control(data)
-                except (msgspec.MsgspecError, UnicodeError):
-                    await connection.close(POLICY_VIOLATION, "malformed message")
-                    return
+            async for message in self._messages(connection, msg.decode_control):
+                data = msg.encode(msg.Received(client, time.monotonic(), message))
                 if isinstance(message, msg.Stop):
-                    self._channels.stop.write(msg.encode(msg.Received(client, now, message)))
-                elif not limit.allows(now):
-                    await connection.close(POLICY_VIOLATION, "too many messages")
-                    return
-                elif isinstance(message, msg.Servo):
+                    channels.stop.write(data)
+                elif not isinstance(message, msg.Servo):
+                    channels.inbound.write(data)
+                elif client == self._states.holder:
                     # The others would only overwrite the holder's; the control process checks it.
-                    if client == self._states.holder:
-                        self._channels.servo.write(msg.encode(msg.Received(client, now, message)))
-                else:
-                    self._channels.inbound.write(msg.encode(msg.Received(client, now, message)))
+                    channels.servo.write(data)
         finally:
-            self._channels.inbound.write(msg.encode(msg.Gone(client)))
+            channels.inbound.write(msg.encode(msg.Gone(client)))
             sending.cancel()
 
     async def _serve_video(self, connection: ServerConnection) -> None:
         sending = asyncio.create_task(self._images.send(connection))
-        limit = RateLimit(time.monotonic())
         try:
-            async for data in connection:
-                try:
-                    drawn = msg.decode_video(data)
-                except (msgspec.MsgspecError, UnicodeError):
-                    await connection.close(POLICY_VIOLATION, "malformed message")
-                    return
-                if not limit.allows(time.monotonic()):
-                    await connection.close(POLICY_VIOLATION, "too many messages")
-                    return
+            async for drawn in self._messages(connection, msg.decode_video):
                 self._images.acknowledge(connection, drawn.image, drawn.width)
         finally:
             self._images.remove(connection)

@@ -18,9 +18,17 @@ from tautscope.console.state import layout_of
 from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
-_SMALL, _STATE, _INFO = 2 * LARGEST_MESSAGE, 1 << 15, 1 << 14
-_QUEUE = 256
+_SMALL = 2 * LARGEST_MESSAGE
 _IMAGES = 3
+_SIZES = {
+    "servo": (_SMALL, 256),
+    "stop": (_SMALL, 2),
+    "inbound": (_SMALL, 256),
+    "state": (1 << 15, 2),
+    "replies": (_SMALL, 256),
+    "images": (1 << 14, _IMAGES),
+}
+"""Channel -> largest record [byte] and number of records. The web server writes the first three."""
 
 
 class Overlay(msgspec.Struct):
@@ -52,11 +60,7 @@ class Overlay(msgspec.Struct):
 
 
 class SharedMemory:
-    """Memory for the messages in both directions; pass it to the other process at its start.
-
-    Attributes of `channels`: ``servo``, ``stop``, ``inbound`` are written by the web server,
-    ``state``, ``replies``, ``images`` by the control process.
-    """
+    """Memory for the messages in both directions; pass it to the other process at its start."""
 
     def __init__(self, context: SpawnContext, config: Config) -> None:
         def memory(size: int) -> Any:
@@ -65,12 +69,7 @@ class SharedMemory:
         self.layout = layout_of(config)
         self.shape = FrameLayout(config.camera).shape
         self.pixel_format = config.camera.pixel_format
-        self.servo = memory(Slots.size(_SMALL, _QUEUE))
-        self.stop = memory(Slots.size(_SMALL, 2))
-        self.inbound = memory(Slots.size(_SMALL, _QUEUE))
-        self.state = memory(Slots.size(_STATE, 2))
-        self.replies = memory(Slots.size(_SMALL, _QUEUE))
-        self.images = memory(Slots.size(_INFO, _IMAGES))
+        self.slots = {name: memory(Slots.size(*size)) for name, size in _SIZES.items()}
         self.pixels = memory(_IMAGES * math.prod(self.shape))
         self.ready = memory(8)
 
@@ -79,14 +78,13 @@ class Channels:
     """Views of a `SharedMemory`; each process makes its own."""
 
     def __init__(self, memory: SharedMemory) -> None:
-        def slots(name: str, count: int) -> Slots:
-            return Slots(memoryview(getattr(memory, name)), count)
-
-        self.servo, self.stop = slots("servo", _QUEUE), slots("stop", 2)
-        self.inbound = slots("inbound", _QUEUE)
-        self.state = slots("state", 2)
-        self.replies = slots("replies", _QUEUE)
-        self.images = ImageChannel(memory, slots("images", _IMAGES))
+        slots = {
+            name: Slots(memoryview(memory.slots[name]), count)
+            for name, (_, count) in _SIZES.items()
+        }
+        self.servo, self.stop, self.inbound = slots["servo"], slots["stop"], slots["inbound"]
+        self.state, self.replies = slots["state"], slots["replies"]
+        self.images = ImageChannel(memory, slots["images"])
 
 
 class ImageChannel:

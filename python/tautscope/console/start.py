@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import secrets
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from tautscope.config import Config
-from tautscope.console.access import ADDRESS, new_token
+from tautscope.console.access import ADDRESS
 from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
@@ -63,7 +64,7 @@ def web_server(config: Config, port: int) -> Iterator[tuple[BaseProcess, Channel
         ConfigError: The port is taken.
     """
     context = multiprocessing.get_context("spawn")
-    memory, token = SharedMemory(context, config), new_token()
+    memory, token = SharedMemory(context, config), secrets.token_urlsafe(32)
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -102,69 +103,39 @@ class Sensors:
         self._widths = np.array([dof.width_limit for dof in config.dof])
 
     def reading(self, measurement: Measurement) -> Reading:
-        """Reading of a measurement of a rig.
+        """Reading of a measurement; of a pose the rotation from the measured orientation.
 
         Raises:
-            SignalError: As `tip`, `pose` and `points`.
+            SignalError: A shape is wrong, a number infinite, all values NaN, the covariance none,
+                or the orientation no rotation; the kinematics has no tip, or no points.
         """
-        covariance = measurement.covariance
+        settings, given = self._config.measurement, measurement.covariance
         if isinstance(measurement, Tip):
-            return self.tip(measurement.values, covariance)
+            values = check_numbers("values", measurement.values, (self._count,))
+            identity = np.eye(self._count)
+            covariance = _covariance(given, settings.tip_deviation * self._widths)
+            return Reading(values, covariance, lambda q: (q, identity), np.copy)
         if isinstance(measurement, Pose):
-            return self.pose(measurement.position, measurement.orientation, covariance)
-        return self.points(measurement.pixels, covariance)
+            kinematics = self._with("tip", "on_pose")
+            place = check_numbers("position", measurement.position, (3,))
+            std = np.full(3, settings.position_deviation)
+            if measurement.orientation is None:
+                return self.own(place, _covariance(given, std), lambda q: kinematics.tip(q)[0])
+            turned = check_rotation(measurement.orientation)
 
-    def tip(self, values: ArrayLike, covariance: ArrayLike | None) -> Reading:
-        """Reading of the tip degree by degree.
+            def predict(q: Floats) -> Floats:
+                position, rotation = kinematics.tip(q)
+                return np.concatenate([position, rotation_vector(turned.T @ rotation)])
 
-        Raises:
-            SignalError: The values are not n numbers or NaN, or the covariance is none.
-        """
-        found = check_numbers("values", values, (self._count,), "numbers or NaN, not all NaN")
-        std = self._config.measurement.tip_deviation * self._widths
-        identity = np.eye(self._count)
-        return Reading(found, _covariance(covariance, std), lambda q: (q, identity), np.copy)
-
-    def pose(
-        self, position: ArrayLike, orientation: ArrayLike | None, covariance: ArrayLike | None
-    ) -> Reading:
-        """Reading of a pose: position, and the rotation from the measured orientation.
-
-        Raises:
-            SignalError: A shape is wrong, the orientation is no rotation, or the kinematics has no
-                tip.
-        """
-        kinematics = self._with("tip", "on_pose")
-        place = check_numbers("position", position, (3,), "numbers or NaN, not all NaN")
-        settings = self._config.measurement
-        std = np.full(3, settings.position_deviation)
-        if orientation is None:
-            return self.own(place, _covariance(covariance, std), lambda q: kinematics.tip(q)[0])
-        turned = check_rotation(orientation)
-
-        def predict(q: Floats) -> Floats:
-            position, rotation = kinematics.tip(q)
-            return np.concatenate([position, rotation_vector(turned.T @ rotation)])
-
-        values = np.concatenate([place, np.zeros(3)])
-        std = np.concatenate([std, np.full(3, settings.orientation_deviation)])
-        return self.own(values, _covariance(covariance, std), predict)
-
-    def points(self, pixels: ArrayLike, covariance: ArrayLike | None) -> Reading:
-        """Reading of points of an image.
-
-        Raises:
-            SignalError: The pixels are not (k, 2) numbers or NaN, or the kinematics has no points.
-        """
-        kinematics = self._with("points", "on_points")
-        count = min(max(len(np.atleast_1d(np.asarray(pixels, dtype=object))), 1), MOST_VALUES // 2)
-        found = check_numbers("pixels", pixels, (count, 2), "numbers or NaN, not all NaN").ravel()
-        std = np.full(found.size, self._config.measurement.point_deviation)
-
-        def predict(q: Floats) -> Floats:
-            return np.ravel(kinematics.points(q))  # type: ignore[attr-defined]
-
-        return self.own(found, _covariance(covariance, std), predict, point=2)
+            values = np.concatenate([place, np.zeros(3)])
+            std = np.concatenate([std, np.full(3, settings.orientation_deviation)])
+            return self.own(values, _covariance(given, std), predict)
+        points: Any = self._with("points", "on_points")
+        rows = np.atleast_1d(np.asarray(measurement.pixels, dtype=object))
+        shape = min(max(len(rows), 1), MOST_VALUES // 2), 2
+        found = check_numbers("pixels", measurement.pixels, shape).ravel()
+        covariance = _covariance(given, np.full(found.size, settings.point_deviation))
+        return self.own(found, covariance, lambda q: np.ravel(points.points(q)), point=2)
 
     def own(
         self,

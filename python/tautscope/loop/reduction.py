@@ -19,11 +19,7 @@ from tautscope.errors import SignalError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.construction import build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
-from tautscope.loop.measurement import (
-    Measurement,
-    Reading,
-    Sensors,
-)
+from tautscope.loop.measurement import Measurement, Points, Pose, Reading, Sensors, Tip
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
 from tautscope.loop.signal_checks import (
@@ -294,8 +290,7 @@ class HysteresisReduction:
             SignalError: A shape is wrong, a number infinite, all values NaN, or the covariance not
                 positive definite; the configuration has no [[dof]].
         """
-        reading = self._axes_sensors("on_tip").tip(values, covariance)
-        return self._update_by(reading, captured_at, sensor)
+        return self.on_sample(Tip(values, captured_at, covariance, sensor))
 
     def on_pose(
         self,
@@ -320,9 +315,7 @@ class HysteresisReduction:
         Raises:
             SignalError: As `on_tip`; the orientation is no rotation; no kinematics is configured.
         """
-        sensors = self._axes_sensors("on_pose")
-        reading = sensors.pose(position, orientation, covariance)
-        return self._update_by(reading, captured_at, sensor)
+        return self.on_sample(Pose(position, captured_at, orientation, covariance, sensor))
 
     def on_points(
         self,
@@ -343,8 +336,7 @@ class HysteresisReduction:
         Raises:
             SignalError: As `on_tip`; the kinematics has no method ``points``.
         """
-        reading = self._axes_sensors("on_points").points(pixels, covariance)
-        return self._update_by(reading, captured_at, sensor)
+        return self.on_sample(Points(pixels, captured_at, covariance, sensor))
 
     def on_measurement(
         self,
@@ -371,14 +363,14 @@ class HysteresisReduction:
         """
         sensors = self._axes_sensors("on_measurement")
         found = check_values(values)
-        count = len(found)
-        known = check_covariance("covariance", covariance, count)
+        known = check_covariance("covariance", covariance, len(found))
         reading = sensors.own(found, known, predict, jacobian)
         return self._update_by(reading, captured_at, sensor)
 
     def on_sample(self, measurement: Measurement) -> Report:
         """Update with a measurement of a rig: `on_tip`, `on_pose` or `on_points`."""
-        reading = self._axes_sensors("on_sample").reading(measurement)
+        call = f"on_{type(measurement).__name__.lower()}"
+        reading = self._axes_sensors(call).reading(measurement)
         return self._update_by(reading, measurement.captured_at, measurement.sensor)
 
     @property
@@ -489,14 +481,8 @@ class HysteresisReduction:
             raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
-        result = self._loop.on_reading(
-            reading.values,
-            reading.covariance,
-            captured_at,
-            reading.model,
-            reading.point,
-            sensor,
-        )
+        known = reading.values, reading.covariance
+        result = self._loop.on_reading(*known, captured_at, reading.model, reading.point, sensor)
         return self._report(result, captured_at)
 
     def _within_limits(

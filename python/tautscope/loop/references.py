@@ -197,6 +197,28 @@ class OperatorMotion:
         return position
 
 
+class Move:
+    """A minimum-jerk move of all DOFs between two positions (n,) [m or rad].
+
+    u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5), x = time / duration, as fast as `speed` (n,) allows,
+    in at least a time [s].
+    """
+
+    def __init__(
+        self,
+        start: NDArray[np.float64],
+        end: NDArray[np.float64],
+        speed: NDArray[np.float64],
+        least: float,
+    ) -> None:
+        self._ends = start.copy(), end
+        self.duration = max(least, MINIMUM_JERK_PEAK * float((np.abs(end - start) / speed).max()))
+
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        """(n,) [m or rad] at `time` [s from its start]."""
+        return _minimum_jerk(*self._ends, time / self.duration)
+
+
 class RecordedReference:
     """A recorded motion of an operator, after a slow approach from the centres of the experiment.
 
@@ -214,10 +236,10 @@ class RecordedReference:
 
     def __init__(self, time: ArrayLike, position: ArrayLike, config: Config) -> None:
         self._position = np.array(position, dtype=np.float64)
-        self._centre = np.array([config.experiment[dof].centre for dof in Dof])
-        distance = np.abs(self._position[0] - self._centre)
+        centre = np.array([config.experiment[dof].centre for dof in Dof])
         slow = APPROACH_SPEED * np.array(config.safety.reference_speed)
-        self.approach: float = max(1.0, MINIMUM_JERK_PEAK * float((distance / slow).max()))
+        self._approach = Move(centre, self._position[0], slow, 1.0)
+        self.approach = self._approach.duration
         """Duration of the approach [s]."""
         stamps = np.array(time, dtype=np.float64)
         self._time = stamps - stamps[0] + self.approach
@@ -229,7 +251,7 @@ class RecordedReference:
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         if time < self.approach:
-            return _minimum_jerk(self._centre, self._position[0], time / self.approach)
+            return self._approach(time)
         return np.array([np.interp(time, self._time, each) for each in self._position.T])
 
 

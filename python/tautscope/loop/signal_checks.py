@@ -50,15 +50,13 @@ def check_time(field: str, value: float) -> float:
     return float(value)
 
 
-def check_numbers(
-    field: str, values: ArrayLike, shape: tuple[int, ...], allowed: str
-) -> NDArray[np.float64]:
+def check_numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Numbers of this shape as an array, none infinite and not all NaN; the error names `field`.
 
     Raises:
         SignalError: They are anything else.
     """
-    allowed = f"an array {shape} of {allowed}"
+    allowed = f"an array {shape} of numbers or NaN, not all NaN"
     array = _numbers(field, values, allowed)
     if array.shape != shape or np.isinf(array).any() or np.isnan(array).all():
         raise SignalError(field, array.tolist(), allowed)
@@ -75,7 +73,7 @@ def check_values(values: ArrayLike) -> NDArray[np.float64]:
     array = _numbers("values", values, allowed)
     if array.ndim != 1 or not 1 <= len(array) <= MOST_VALUES:
         raise SignalError("values", f"an array {array.shape}", allowed)
-    return check_numbers("values", array, array.shape, "numbers or NaN, not all NaN")
+    return check_numbers("values", array, array.shape)
 
 
 def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.float64]:

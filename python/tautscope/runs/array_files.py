@@ -7,13 +7,13 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.errors import MissingExtraError, RecordError
+from tautscope.errors import RecordError
+from tautscope.extras import require_module
 
 if TYPE_CHECKING:
     import polars as pl
@@ -72,13 +72,12 @@ def _from_numpy(data: bytes, file: str) -> Arrays:
         with np.load(io.BytesIO(data)) as archive:
             return {name: archive[name] for name in archive if archive[name].dtype.kind in "fiub"}
     except Exception as error:
-        raise RecordError(file, _first_line(error), "a .npz file of numbers") from None
+        raise RecordError(file, first_line(error), "a .npz file of numbers") from None
 
 
 def _from_matlab(data: bytes, file: str) -> Arrays:
     """In a process of its own: SciPy's reader may crash it on a damaged file."""
-    if find_spec("scipy") is None:
-        raise MissingExtraError("reading a .mat file", ("scipy",), ("analysis",))
+    require_module("scipy", "reading a .mat file", "analysis")
     command = [sys.executable, "-m", "tautscope.runs.matlab_file"]
     done = subprocess.run(command, input=data, capture_output=True, check=False)
     if done.returncode != 0:
@@ -88,8 +87,9 @@ def _from_matlab(data: bytes, file: str) -> Arrays:
     return _from_numpy(done.stdout, file)
 
 
-def _first_line(error: Exception) -> str:
-    return next(iter(str(error).splitlines()), type(error).__name__)
+def first_line(error: BaseException) -> str:
+    """The first line of an error of a library; its type if it has none."""
+    return next(iter(str(error).splitlines()), "") or type(error).__name__
 
 
 def with_single_numbers(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from itertools import chain
 from operator import attrgetter
 from os import PathLike
@@ -13,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tautscope.errors import MissingExtraError, RecordError
+from tautscope.errors import RecordError
+from tautscope.extras import require_module
+from tautscope.runs.array_files import first_line
 
 if TYPE_CHECKING:
     import polars as pl
@@ -55,16 +56,14 @@ def read_bag(path: str | PathLike[str]) -> pl.DataFrame:
         MissingExtraError: rosbags is not installed.
         RecordError: The bag is damaged, or no topic has numbers.
     """
-    if find_spec("rosbags") is None:
-        raise MissingExtraError("reading a ROS 2 bag", ("rosbags",), ("ros2",))
+    require_module("rosbags", "reading a ROS 2 bag", "ros2")
     place = Path(path)
     if place.is_dir() and not (place / _METADATA).is_file():
         raise RecordError(f"{place / _METADATA}", "no such file", _ALLOWED)
     try:
         groups, types = _read(place)
     except Exception as error:  # of any kind, for a damaged file
-        what = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise RecordError(str(place), what, f"{_ALLOWED}, complete") from None
+        raise RecordError(str(place), first_line(error), f"{_ALLOWED}, complete") from None
     if not groups:
         found = ", ".join(f"{topic} of {kind}" for topic, kind in types.items())
         raise RecordError(

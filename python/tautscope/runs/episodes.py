@@ -10,15 +10,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tautscope.errors import MissingExtraError, RecordError
-from tautscope.runs.array_files import with_single_numbers
+from tautscope.errors import RecordError
+from tautscope.extras import require_module
+from tautscope.runs.array_files import first_line, with_single_numbers
 from tautscope.runs.tables import Sheet, with_axes
 
 EPISODE = "episode_index"
@@ -51,8 +51,7 @@ def list_episodes(folder: str | PathLike[str]) -> list[Episode]:
         MissingExtraError: Polars is not installed.
         RecordError: There is no episode, or a file is damaged.
     """
-    if find_spec("polars") is None:
-        raise MissingExtraError("reading a data set", ("polars",), ("analysis",))
+    require_module("polars", "reading a data set", "analysis")
     import polars as pl  # noqa: PLC0415  takes 0.3 s
 
     found = []
@@ -113,7 +112,6 @@ def _flat(names: Any) -> list[str]:
 def _damaged(file: Path, error: BaseException) -> RecordError:
     with file.open("rb") as stream:
         is_pointer = stream.read(40).startswith(b"version https://git-lfs")
-    what = next(iter(str(error).splitlines()), "") or type(error).__name__
     if is_pointer:
         return RecordError(str(file), "a pointer of Git LFS", "the file itself: git lfs pull")
-    return RecordError(str(file), what, f"a Parquet file with a column {EPISODE}")
+    return RecordError(str(file), first_line(error), f"a Parquet file with a column {EPISODE}")

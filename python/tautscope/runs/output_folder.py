@@ -1,4 +1,4 @@
-"""Output folders that appear complete or not at all."""
+"""Output folders that appear complete or not at all, and what an interrupted run leaves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
-from tautscope.errors import OutputError
+from tautscope.errors import MotionHeldError, OutputError
 
 _LOG = logging.getLogger(__name__)
 
@@ -112,4 +112,20 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
         _LOG.info("written: %s", target)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
+        raise
+
+
+@contextmanager
+def recording_saved(folder: Path) -> Iterator[None]:
+    """If the block ends with `MotionHeldError`, write the error's recording into the folder.
+
+    The folder is made if it does not exist; the error gets a note that names it.
+    """
+    try:
+        yield
+    except MotionHeldError as error:
+        if error.recording is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            error.recording.write(folder, "" if error.recording.compensated else "_uncompensated")
+            error.add_note(f"What was recorded until then: {folder}")
         raise

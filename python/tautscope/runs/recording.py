@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -16,7 +17,6 @@ from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof, NamedDof
 from tautscope.errors import MissingPathError, RecordError
 from tautscope.loop.references import Segment
-from tautscope.runs.csv_files import read_csv, write_csv
 from tautscope.runs.output_folder import new_folder
 
 Floats = NDArray[np.float64]
@@ -37,27 +37,18 @@ def trace_columns(dofs: Iterable[NamedDof]) -> np.dtype[np.void]:
     return np.dtype([("time", "f8"), *((name, "f8") for name in names), ("status", "U16")])
 
 
-def frame_columns(
-    dofs: Iterable[NamedDof], features: Sequence[str] = FEATURES
-) -> np.dtype[np.void]:
-    """Columns of the updates of a run with these degrees of freedom and features."""
-    labels = [dof.label for dof in dofs]
+def update_columns(config: Config) -> np.dtype[np.void]:
+    """Columns of the updates of a run: of a robot with [[dof]] without features."""
+    labels = [dof.label for dof in config.dofs]
+    features = [] if config.dof else list(FEATURES)
     groups = ["features", "predicted_features", "innovation", "true_features"]
     return np.dtype(
         [("captured_at", "f8"), ("arrived_at", "f8"), ("sequence", "i8")]
         + [("status", "U16"), ("valid", "?")]
         + [(name, "f8") for name in _names(["estimate", "predicted", "true"], labels)]
         + [(name, "?") for name in _names(["observable"], labels)]
-        + [(name, "f8") for name in _names(groups, list(features))]
+        + [(name, "f8") for name in _names(groups, features)]
     )
-
-
-def update_columns(config: Config) -> np.dtype[np.void]:
-    """Columns of the updates of a run: of a robot with [[dof]] without features."""
-    return frame_columns(config.dofs, () if config.dof else FEATURES)
-
-
-FRAME_COLUMNS = frame_columns(Dof)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +131,17 @@ class Recording:
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
-        return _between(self.trace["time"], self._start_of(segment), segment, first, last)
+        return self._between(self.trace["time"], segment, first, last)
 
     def frames_during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(frames,) frames captured in periods `first` to `last` of a segment."""
-        return _between(self.frames["captured_at"], self._start_of(segment), segment, first, last)
+        return self._between(self.frames["captured_at"], segment, first, last)
 
-    def _start_of(self, segment: Segment) -> float:
-        return float(self.trace["time"][0]) + segment.start
+    def _between(
+        self, time: Floats, segment: Segment, first: float, last: float
+    ) -> NDArray[np.bool_]:
+        start = float(self.trace["time"][0]) + segment.start
+        return (time >= start + first * segment.period) & (time <= start + last * segment.period)
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml.
@@ -162,8 +156,8 @@ class Recording:
         """Write the files of `save` into an existing folder, with a suffix to their names."""
         import tomlkit  # noqa: PLC0415  only writing needs it
 
-        write_csv(folder / f"trace{suffix}.csv", self.trace)
-        write_csv(folder / f"frames{suffix}.csv", self.frames)
+        _write_csv(folder / f"trace{suffix}.csv", self.trace)
+        _write_csv(folder / f"frames{suffix}.csv", self.frames)
         facts = tomlkit.dumps(run_facts(self.compensated, self.segments))
         (folder / f"recording{suffix}.toml").write_text(facts, encoding="utf-8")
         (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
@@ -188,8 +182,8 @@ class Recording:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
         return cls(
-            trace=read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
-            frames=read_csv(place / f"frames{suffix}.csv", update_columns(config)),
+            trace=_read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
+            frames=_read_csv(place / f"frames{suffix}.csv", update_columns(config)),
             config=config,
             compensated=compensated,
             segments=segments,
@@ -230,7 +224,34 @@ def per_feature(table: Table, group: str) -> Floats:
     return np.stack([table[f"{group}_{name}"] for name in FEATURES], axis=1)
 
 
-def _between(
-    time: Floats, start: float, segment: Segment, first: float, last: float
-) -> NDArray[np.bool_]:
-    return (time >= start + first * segment.period) & (time <= start + last * segment.period)
+def _write_csv(path: Path, table: Table) -> None:
+    """Write a structured array as CSV with a header; every number is written in full."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table.dtype.names or ())
+        writer.writerows(table.tolist())
+
+
+def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
+    """Read a file of `_write_csv`; equal to what was written, to the last bit.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        RecordError: A column or a cell is not as `_write_csv` writes it.
+    """
+    if not path.is_file():
+        raise MissingPathError("recording", str(path), "a file of a saved recording")
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    names = dtype.names or ()
+    if tuple(header) != names:
+        raise RecordError(str(path), ",".join(header), f"the columns {', '.join(names)}")
+    table = np.empty(len(rows), dtype)
+    try:
+        columns = list(zip(*rows, strict=True)) or [()] * len(names)
+        for name, column in zip(names, columns, strict=True):
+            is_flag = dtype[name].kind == "b"
+            table[name] = [cell == "True" for cell in column] if is_flag else column
+    except ValueError as error:
+        raise RecordError(str(path), str(error), "a number in every cell") from None
+    return table

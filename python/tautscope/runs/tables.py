@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.errors import MissingExtraError, MissingPathError, RecordError
+from tautscope.errors import MissingPathError, RecordError
+from tautscope.extras import require_module
 from tautscope.runs import bags
-from tautscope.runs.array_files import read_arrays, with_single_numbers
+from tautscope.runs.array_files import first_line, read_arrays, with_single_numbers
 from tautscope.runs.cells import numbers
 from tautscope.runs.pose_columns import find_axes, title_of, travel, turn
 from tautscope.runs.table_text import split_table
@@ -176,8 +176,7 @@ def with_axes(sheet: Sheet) -> Sheet:
 
 
 def _open(path: str | PathLike[str], what: str) -> Sheet:
-    if find_spec("polars") is None:
-        raise MissingExtraError("reading a table", ("polars",), ("analysis",))
+    require_module("polars", "reading a table", "analysis")
     import polars as pl  # noqa: PLC0415  takes 0.3 s
 
     file = "standard input" if str(path) == STDIN else str(path)
@@ -208,7 +207,7 @@ def _open(path: str | PathLike[str], what: str) -> Sheet:
             )
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         kind = "a Parquet file" if is_parquet else "a CSV file with a header line"
-        raise RecordError(file, str(error).splitlines()[0], kind) from None
+        raise RecordError(file, first_line(error), kind) from None
     if text is None:
         return Sheet(file, frame, frame.columns, [], [], np.arange(1, len(frame) + 1), "row")
     titles = text.titles + [str(k + 1) for k in range(len(text.titles), text.width)]
