@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +82,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.report import demo, tables  # noqa: PLC0415
+    from tautscope.report import demo  # noqa: PLC0415
 
     if options.robot is not None:
         _run_robot(options)
@@ -107,16 +108,7 @@ def _run(options: argparse.Namespace) -> None:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     if options.json:
-        document = tables.to_json(
-            config.profile,
-            seeds,
-            found.results,
-            found.operator_results,
-            sim_seconds=found.sim_seconds,
-            wall_seconds=found.wall_seconds,
-            article_results=found.article_results,
-        )
-        print_json({"folder": str(folder), **document})
+        print_json({"folder": str(folder), **found.to_json()})
     else:
         _print_table1(found)
         _print_operator_motion(found)
@@ -161,40 +153,34 @@ def _table(title: str, seeds: int) -> Table:
     return table
 
 
-def _cell(
-    row: Row,
-    dof: NamedDof,
-    median: dict[NamedDof, Any],
-    worst: dict[NamedDof, Any],
-    *,
-    several: bool,
-) -> str:
-    """A figure of a DOF, with the worst one in brackets if there are several seeds."""
+def _cell(row: Row, dof: NamedDof, results: Sequence[dict[NamedDof, Any]]) -> str:
+    """The median of a figure of a DOF, and of several seeds the worst one in brackets."""
     from tautscope.report import tables  # noqa: PLC0415
+    from tautscope.report.results import combine  # noqa: PLC0415
 
-    middle, bad = (tables.cell(row, dof, getattr(of[dof], row.name)) for of in (median, worst))
-    return f"{middle} ({bad})" if several else middle
+    middle, bad = (
+        tables.cell(row, dof, getattr(combine(results, how)[dof], row.name))
+        for how in ("median", "worst")
+    )
+    return f"{middle} ({bad})" if len(results) > 1 else middle
 
 
 def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import ROWS  # noqa: PLC0415
+    from tautscope.report.results import ROWS  # noqa: PLC0415
 
-    profiles = demo.by_profile
-    several = len(demo.seeds) > 1
-    figures = [(tables.median(results), tables.worst(results)) for results in profiles.values()]
     table = _table("Table 1: the article, and the twin", len(demo.seeds))
     for dof in demo.results[0]:
         table.add_column(
             f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
         )
-        for name in profiles:
+        for name in demo.by_profile:
             table.add_column(f"\n{name}", justify="right")
     for row in ROWS:
         cells = []
         for dof in demo.results[0]:
             cells.append(tables.article_cell(row, dof))
-            cells += [_cell(row, dof, *each, several=several) for each in figures]
+            cells += [_cell(row, dof, results) for results in demo.by_profile.values()]
         table.add_row(row.title, *cells)
     screen = console()
     screen.print(table)
@@ -203,18 +189,15 @@ def _print_table1(demo: Demo) -> None:
 
 def _print_operator_motion(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.rows import OPERATOR_ROWS  # noqa: PLC0415
+    from tautscope.report.operator_motion import OPERATOR_ROWS  # noqa: PLC0415
 
     results = demo.operator_results
-    several = len(results) > 1
     title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
     table = _table(title, len(results))
-    middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
-    for dof in middle:
+    for dof in results[0]:
         table.add_column(tables.heading(dof), justify="right", no_wrap=True)
     for row in OPERATOR_ROWS:
-        cells = [_cell(row, dof, middle, bad, several=several) for dof in middle]
-        table.add_row(row.title, *cells)
+        table.add_row(row.title, *(_cell(row, dof, results) for dof in results[0]))
     screen = console()
     screen.print(table)
     screen.print("Errors of the true tip, after the first 40 s.\n")
