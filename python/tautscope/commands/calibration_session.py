@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping
 from html import escape
@@ -98,7 +97,7 @@ class CalibrationSession:
         return report
 
     def _page(self, titles: Mapping[str, str]) -> str:
-        from tautscope.report.report import document  # noqa: PLC0415
+        from tautscope.report.report import document, embedded  # noqa: PLC0415
 
         parts = []
         for name, title in titles.items():
@@ -112,11 +111,7 @@ class CalibrationSession:
             if found["values"]:
                 parts.append(_table(found["values"], found["std"]))
             for file, caption in found["figures"]:
-                code = base64.b64encode((self.folder / file).read_bytes()).decode()
-                parts.append(
-                    f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{code}">'
-                    f"<figcaption>{escape(caption)}</figcaption></figure>"
-                )
+                parts.append(embedded((self.folder / file).read_bytes(), "png", caption))
         parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
         kind = "a simulated rig" if self.state.seed is not None else "the rig"
         return document("Calibration", f"Calibration of {kind} of {self._file}.", "\n".join(parts))

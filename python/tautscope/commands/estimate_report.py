@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,8 +11,8 @@ from typing import Any
 from rich.table import Table
 
 from tautscope.commands.printing import console, print_json
-from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
-from tautscope.report.tables import finite_or_none
+from tautscope.log.comparison import estimation_quality, write_replay
+from tautscope.report.tables import finite
 from tautscope.runs.recording import Recording
 
 
@@ -45,9 +44,9 @@ def write_estimates(
             "dof": {},
         }
         for label, figures in after.items():
-            entry = {"replayed": _finite(figures)}
+            entry = {"replayed": finite(figures)}
             if before is not None:
-                entry["recorded"] = _finite(before[label])
+                entry["recorded"] = finite(before[label])
             document["dof"][label] = entry
         print_json(document)
         return
@@ -57,8 +56,8 @@ def write_estimates(
 
 def _print_table(
     replayed: Recording,
-    before: dict[str, EstimationQuality] | None,
-    after: dict[str, EstimationQuality],
+    before: dict[str, dict[str, float]] | None,
+    after: dict[str, dict[str, float]],
 ) -> None:
     noun = "measurements" if replayed.config.dof else "images"
     table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
@@ -79,7 +78,7 @@ def _print_table(
         cells = []
         for dof in dofs:
             pair = [each[dof.label] for each in (before, after) if each is not None]
-            cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
+            cells += [_cell(each[name], name, dof.display_scale) for each in pair]
         if any(cells):
             table.add_row(title, *cells)
     console().print(table)
@@ -89,7 +88,3 @@ def _cell(value: float, name: str, scale: float) -> str:
     if math.isnan(value):
         return "unknown" if name == "width" else ""
     return f"{100 * value:.0f} %" if name == "seen" else f"{scale * value:.3g}"
-
-
-def _finite(figures: EstimationQuality) -> dict[str, float | None]:
-    return {name: finite_or_none(value) for name, value in asdict(figures).items()}

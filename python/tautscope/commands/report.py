@@ -37,19 +37,18 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.log.stored_run import read_run  # noqa: PLC0415
-    from tautscope.report.run_folder import write_report  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
-    stored = read_run(options.path, options.uncompensated)
-    recording = stored.run.main
+    run = read_run(options.path, options.uncompensated)
+    recording = run.main
     time, seen = recording.trace["time"], "measurements" if recording.config.dof else "images"
     facts = {
-        "run": str(stored.source),
+        "run": str(run.source),
         "recorded": f"{time[-1] - time[0]:.1f} s, {len(recording.frames)} {seen}",
     }
     with new_folder(folder) as place:
-        write_report(stored.run, place, facts)
+        run.write_report(place, facts)
     if options.json:
-        print_json({"folder": str(folder), "source": str(stored.source), **stored.run.summary()})
+        print_json({"folder": str(folder), "source": str(run.source), **run.summary()})
         return
-    print_results(stored.run, folder)
+    print_results(run, folder)

@@ -51,7 +51,6 @@ def run(
     from tautscope.log.writer import run_log  # noqa: PLC0415
     from tautscope.report.operator_motion import motion_of  # noqa: PLC0415
     from tautscope.report.recorded_run import RecordedRun  # noqa: PLC0415
-    from tautscope.report.run_folder import write_report  # noqa: PLC0415
     from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
@@ -76,7 +75,7 @@ def run(
                 rig.close()
             runs[-1].write(folder, suffix)
     found = RecordedRun(runs[1], runs[0])
-    write_report(found, folder, {"rig": name})
+    found.write_report(folder, {"rig": name})
     (folder / "run.json").write_text(json.dumps(found.summary(), indent=1), encoding="utf-8")
     if options.json:
         print_json({"folder": str(folder), **found.summary()})

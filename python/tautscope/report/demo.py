@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tautscope._core import __version__
 from tautscope.config import Config
@@ -18,11 +18,14 @@ from tautscope.report.operator_motion import (
     evaluate_operator_motion,
     operator_motion,
 )
-from tautscope.report.report import FIGURE5_CAPTION, CaptionedFigure
+from tautscope.report.report import FIGURE5_CAPTION
 from tautscope.report.results import ROWS, Results, combine, evaluate
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
 from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _CAVEATS = """
 <ul class="note">
@@ -189,16 +192,19 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     from tautscope.report.film import write_film  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-    figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
-    captioned = [CaptionedFigure(figure9, _figure9_caption(demo))]
-    if demo.compensated.snapshot is not None:
-        captioned.append(
-            CaptionedFigure(
-                figures.figure5(demo.compensated.snapshot, demo.config), FIGURE5_CAPTION
-            )
+    drawn = {
+        "fig9": (
+            figures.figure9(demo.uncompensated, demo.compensated, demo.article),
+            _figure9_caption(demo),
         )
-    operator_figure = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)
-    captioned.append(CaptionedFigure(operator_figure, _OPERATOR_CAPTION.format(demo.seeds[0])))
+    }
+    if demo.compensated.snapshot is not None:
+        figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
+        drawn["fig5"] = figure5, FIGURE5_CAPTION
+    drawn["operator_motion"] = (
+        draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
+        _OPERATOR_CAPTION.format(demo.seeds[0]),
+    )
     with new_folder(folder) as place:
         demo.operator_compensated.write(place, "_operator_motion")
         demo.operator_uncompensated.write(place, "_operator_motion_uncompensated")
@@ -208,15 +214,13 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         motions = {str(demo.config.profile): demo.operator_results}
         tables.write_csv(place / "operator_motion.csv", demo.seeds, motions)
         with style():
-            figure9.savefig(place / "fig9.png")
-            figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
-            operator_figure.savefig(place / "operator_motion.png")
-            operator_figure.savefig(place / "operator_motion.pdf", metadata={"CreationDate": None})
-            for each in captioned[1:-1]:
-                each.figure.savefig(place / "fig5.png")
+            for name, (figure, _) in drawn.items():
+                figure.savefig(place / f"{name}.png")
+                if name != "fig5":
+                    figure.savefig(place / f"{name}.pdf", metadata={"CreationDate": None})
         film = place / "film.gif"
         write_film(film, demo.operator_uncompensated, demo.operator_compensated)
-        page = demo_report(demo, captioned, film.read_bytes())
+        page = demo_report(demo, drawn.values(), film.read_bytes())
         (place / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -232,7 +236,7 @@ def _figure9_caption(demo: Demo) -> str:
     )
 
 
-def demo_report(demo: Demo, figures: Sequence[CaptionedFigure], film: bytes) -> str:
+def demo_report(demo: Demo, figures: Iterable[tuple[Figure, str]], film: bytes) -> str:
     """The page of ``tautscope demo``, with an animated GIF of the operator's motion."""
     seeds, profiles = demo.seeds, demo.by_profile
     several = len(seeds) > 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config, Sine
 from tautscope.dof import NamedDof
@@ -14,9 +13,7 @@ from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.rows import figure, rows_of
 from tautscope.report.tracking_bound import tracking_bound
-from tautscope.runs.recording import Recording, per_dof
-
-Floats = NDArray[np.float64]
+from tautscope.runs.recording import Floats, Recording, per_dof
 
 FIRST_SEED = 40
 """Seed of the motion on the twin of seed 0."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
-from tautscope._core import __version__
 from tautscope.config import Config, dump_config
 from tautscope.dof import Dof, NamedDof
 from tautscope.report import tables
@@ -58,41 +56,6 @@ FIGURE5_CAPTION = (
 )
 _IMAGES = "the endoscope\u2019s images"
 _UNKNOWN_TIP = ": the true state of the tip is not known on hardware"
-
-
-@dataclass(frozen=True)
-class CaptionedFigure:
-    """A figure and its caption."""
-
-    figure: Figure
-    caption: str
-
-
-def run_report(
-    config: Config,
-    facts: dict[str, str],
-    section: str,
-    figures: Sequence[CaptionedFigure],
-    warnings: Sequence[str],
-) -> str:
-    """The page of ``tautscope run`` and ``tautscope report``: one or two recorded runs.
-
-    Args:
-        config: Configuration of the run.
-        facts: Further facts of the run.
-        section: Of the figures of merit: `table1_section` or `recorded_motion_section`.
-        figures: Figures of the run.
-        warnings: Warnings of the run.
-    """
-    return page(
-        "on the rig named below",
-        f"""{section}
-{warning_list(warnings)}
-<h2>Figures</h2>
-{figure_list(figures)}""",
-        {"tautscope": __version__, **facts},
-        config,
-    )
 
 
 def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
@@ -149,9 +112,14 @@ def document(title: str, lead: str, body: str) -> str:
 """
 
 
-def figure_list(figures: Sequence[CaptionedFigure]) -> str:
+def figure_list(figures: Iterable[tuple[Figure, str]]) -> str:
     """The figures with their captions, one below the other."""
-    return "".join(_figure(each) for each in figures)
+    parts = []
+    for figure, caption in figures:
+        data = io.BytesIO()
+        figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
+        parts.append(embedded(data.getvalue(), "jpeg", caption))
+    return "".join(parts)
 
 
 def warning_list(warnings: Sequence[str]) -> str:
@@ -260,14 +228,8 @@ article.</p>
 {row_explanations(OPERATOR_ROWS, results if profile == "best" else ())}"""
 
 
-def _figure(captioned: CaptionedFigure) -> str:
-    data = io.BytesIO()
-    captioned.figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
-    return embedded(data.getvalue(), "jpeg", captioned.caption)
-
-
 def embedded(data: bytes, kind: str, caption: str) -> str:
-    """A figure of an encoded image, ``jpeg`` or ``gif``, in the page itself."""
+    """A figure of an encoded image, ``jpeg``, ``png`` or ``gif``, in the page itself."""
     code, text = base64.b64encode(data).decode(), escape(caption)
     return (
         f'<figure><img alt="{text}" src="data:image/{kind};base64,{code}">'

@@ -102,10 +102,7 @@ def write_csv(
 
 def operator_to_json(results: Mapping[NamedDof, Figures]) -> dict[str, dict[str, float | None]]:
     """Figures of an operator motion by DOF [m or rad]; an unknown figure is None."""
-    return {
-        dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
-        for dof, figures in results.items()
-    }
+    return {dof.label: finite(asdict(figures)) for dof, figures in results.items()}
 
 
 def summary(results: Sequence[dict[NamedDof, DofResult]]) -> dict[str, Any]:
@@ -126,6 +123,11 @@ def _summary(dof: NamedDof, result: DofResult) -> Iterator[tuple[str, float | No
         if row.in_summary:
             value = in_display_unit(row, dof, getattr(result, row.name))
             yield row.name, finite_or_none(value)
+
+
+def finite(figures: Mapping[str, float]) -> dict[str, float | None]:
+    """Figures by name, None for those that are not finite."""
+    return {name: finite_or_none(value) for name, value in figures.items()}
 
 
 def finite_or_none(value: float) -> float | None:
