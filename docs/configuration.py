@@ -48,8 +48,8 @@ SHORT = {
 LAST = """
 ## Settings of algorithms
 
-`tautscope config` prints the keys, with units, limits and meaning, of marker detection and simulation,
-and of `tautscope calibrate`.
+`tautscope config` prints the keys, with units, limits and meaning, of marker detection and
+simulation, and of `tautscope calibrate`.
 """
 INTERNAL = ("vision", "twin", "calibration")
 """Sections without their keys: whoever sets them reads `tautscope config`."""

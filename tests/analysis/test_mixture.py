@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from tautscope._core import track_coefficients
 from tautscope.analysis.comparison import HORIZONS, analyze, seen_at
 from tautscope.analysis.models import last_tip, mixture
 from tautscope.analysis.models.components import Component, Refit, Signals
-from tautscope.analysis.models.task import Task, continued, shared
+from tautscope.analysis.models.task import Task, continued
 from tautscope.analysis.models.tracked_regression import NOISE, UNKNOWN, track
 from tautscope.config import load_config
 from tautscope.errors import SignalError
@@ -86,7 +85,8 @@ def test_a_tracked_regression_is_the_gaussian_conditional_mean(walks: tuple[floa
     travel = np.cumsum(rng.uniform(0, 0.2, samples))
     tips = rng.normal(size=samples)
     at = np.arange(2, samples, 3)
-    found = track(features, travel, tips, at, spread=spread, walks=np.array([walks]))[:, 0]
+    seen = np.where(np.isin(np.arange(samples), at), tips, np.nan)
+    found = track(features, travel, seen, spread=spread, walks=np.array([walks]))[:, 0]
     assert np.isnan(found[:3]).all()
     for k in range(3, samples):
         past = at[at < k]
@@ -109,7 +109,8 @@ def test_a_tracked_regression_is_a_kalman_filter_per_random_walk() -> None:
     features, tips = rng.normal(size=(samples, size)), rng.normal(size=samples)
     travel, at = np.cumsum(rng.uniform(0, 0.2, samples)), np.arange(5, samples, 2)
     walks = np.array([(d, w) for d in (0.0, 0.1, 1.0) for w in (0.0, 0.05, 0.4)])
-    found = track(features, travel, tips, at, spread=spread, walks=walks)
+    seen = np.where(np.isin(np.arange(samples), at), tips, np.nan)
+    found = track(features, travel, seen, spread=spread, walks=walks)
     for number, (disturbance, coefficient) in enumerate(walks):
         prior = np.array([spread**2] * size + [UNKNOWN**2])
         walk = np.array([(coefficient * spread) ** 2] * size + [disturbance**2])
@@ -174,22 +175,6 @@ def test_the_mixture_is_the_formula_written_out(
         total = totals[max(j for j in totals if signals.at[j] < k)]
         assert found[k] == pytest.approx(total @ variants[k], rel=1e-9), k
         assert shares["b"][k] == pytest.approx(total[1:].sum(), rel=1e-9), k
-
-
-def test_a_shared_result_is_computed_once_per_task() -> None:
-    calls = []
-
-    @shared
-    def scaled(record: Task, factor: float) -> Floats:
-        calls.append(factor)
-        return factor * record.command
-
-    record = task(np.arange(4.0), np.arange(4.0))
-    assert scaled(record, 2.0) is scaled(record, 2.0)
-    assert scaled(record, 3.0)[1] == 3
-    other = replace(record, command=-record.command)
-    assert scaled(other, 2.0)[1] == -2
-    assert calls == [2.0, 3.0, 2.0]
 
 
 def test_weights_are_posterior_probabilities() -> None:

@@ -14,7 +14,7 @@ from tautscope.cli import main
 from tautscope.config import dump_config, load_config
 from tautscope.report import demo
 from tautscope.report.operator_motion import operator_motion
-from tautscope.report.rows import ROWS
+from tautscope.report.results import ROWS
 from tautscope.runs.recording import Recording, per_dof
 
 SUMMARY = [

@@ -20,7 +20,7 @@ from tautscope import HysteresisReduction, Pose, Tip
 from tautscope.config import Config, Sine, axes, load_config
 from tautscope.errors import ConfigError, RecordError
 from tautscope.log import topics
-from tautscope.log.alignment import align_log
+from tautscope.log.alignment import align_recording
 from tautscope.log.export import export_csv, recover
 from tautscope.log.fields import multi_array
 from tautscope.log.header import RunInfo, header_messages, read_header
@@ -117,7 +117,7 @@ def test_another_configuration_gives_other_estimates(mixed: tuple[Path, Recordin
 
 def test_the_delay_of_images_needs_images(mixed: tuple[Path, Recording]) -> None:
     with pytest.raises(RecordError, match="calibrate latency --rig"):
-        align_log(read_log(mixed[0]))
+        align_recording(read_log(mixed[0]).recording())
 
 
 def test_other_readers_see_names_and_numbers(mixed: tuple[Path, Recording]) -> None:

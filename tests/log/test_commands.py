@@ -13,7 +13,7 @@ from recorded import record
 from rosbags.highlevel import AnyReader
 from tautscope.cli import main
 from tautscope.config import Config, dump_config
-from tautscope.log.reader import Update, read_log
+from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.writer import LogSummary
 from tautscope.runs.recording import Recording, per_dof
 
@@ -35,6 +35,26 @@ def failed(capsys: Capture, *arguments: str) -> str:
     assert out == ""
     assert err.startswith("error: ")
     return err
+
+
+def write_video(file: Path, log: Log, start: float) -> None:
+    """A lossless video of the frames that arrived after `start` [s], its first one at time 0."""
+    updates = {
+        index: float(event.row[0])
+        for index, event in log.events.items()
+        if isinstance(event, Update) and float(event.row[0]) > start
+    }
+    with av.open(str(file), "w") as container:
+        stream = container.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 720, 576, "bgr0"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for index, at in updates.items():
+            frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
+            frame = frame.reformat(format="bgr0")
+            frame.pts = round(1000 * (at - min(updates.values())))
+            frame.time_base = stream.time_base
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
 
 
 def test_recover_repairs_a_truncated_log(capsys: Capture, truncated: Path) -> None:
@@ -125,17 +145,7 @@ def test_replay_of_a_video_and_motor_positions(
     """A lossless video of the run's frames, with a time offset of 1000 s to the table."""
     path, recording, _ = recorded
     log = read_log(path)
-    with av.open(str(tmp_path / "clip.mkv"), "w") as container:
-        stream = container.add_stream("ffv1", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 720, 576, "bgr0"
-        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
-        for index, event in log.events.items():
-            if isinstance(event, Update):
-                frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
-                frame = frame.reformat(format="bgr0")
-                frame.pts, frame.time_base = round(1000 * float(event.row[0])), stream.time_base
-                container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+    write_video(tmp_path / "clip.mkv", log, -1.0)
     with (tmp_path / "motors.csv").open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["time", "insertion", "rotation", "bending"])
@@ -195,23 +205,8 @@ def test_a_late_video_is_aligned(
     """The video begins 0.6 s after the motors, whose table is in mm and degrees."""
     path, recording = whole
     log = read_log(path)
-    events = [
-        (index, event)
-        for index, event in log.events.items()
-        if isinstance(event, Update) and float(event.row[0]) > 0.59
-    ]
     video, motors = tmp_path / "clip.mkv", tmp_path / "motors.csv"
-    with av.open(str(video), "w") as container:
-        stream = container.add_stream("ffv1", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 720, 576, "bgr0"
-        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
-        for index, event in events:
-            frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
-            frame = frame.reformat(format="bgr0")
-            frame.pts = round(1000 * (float(event.row[0]) - float(events[0][1].row[0])))
-            frame.time_base = stream.time_base
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+    write_video(video, log, 0.59)
     positions = per_dof(recording.trace, "command") * [1e3, 180 / np.pi, 180 / np.pi]
     titles = "time,insertion_mm,rotation_deg,bending_deg"
     table = np.column_stack([recording.trace["time"], positions])

@@ -42,10 +42,10 @@ def test_a_run_folder_gives_the_figures_of_the_run(pair: tuple[Path, RecordedRun
     folder, run = pair
     stored = read_run(folder)
     assert stored.source == folder / "compensated.mcap"
-    assert stored.run.results == run.results
+    assert stored.results == run.results
     apart = read_run(folder / "compensated.mcap", folder / "uncompensated.mcap")
-    assert apart.run.to_json() == run.to_json()
-    alone = read_run(folder / "compensated.mcap").run.results
+    assert apart.to_json() == run.to_json()
+    alone = read_run(folder / "compensated.mcap").results
     assert all(np.isnan(each.reduction) for each in alone.values())
 
 
@@ -54,7 +54,7 @@ def test_tables_give_the_figures_of_the_run(pair: tuple[Path, RecordedRun], tmp_
     assert run.uncompensated is not None
     run.main.write(tmp_path)
     run.uncompensated.write(tmp_path, "_uncompensated")
-    stored = read_run(tmp_path).run
+    stored = read_run(tmp_path)
     assert stored.results == run.results
     assert "do not have its warnings" in stored.main.warnings[0]
 
@@ -88,7 +88,7 @@ def test_a_truncated_log_gives_the_part_that_it_has(
     assert main(["report", str(file), "--out", str(tmp_path / "out")]) == 0
     output = capsys.readouterr().out
     assert "truncated.mcap is damaged or truncated" in output
-    stored = read_run(file).run.main
+    stored = read_run(file).main
     count = len(stored.trace)
     assert 100 < count < len(run.main.trace)
     lasted = stored.trace["time"][-1] - stored.trace["time"][0]
@@ -128,7 +128,7 @@ def test_report_of_a_run_without_compensation_that_was_stopped(
     (stopped / "uncompensated.mcap").write_bytes(whole[: len(whole) // 10])
     assert main(["report", str(stopped), "--out", str(tmp_path / "out")]) == 0
     output = capsys.readouterr().out
-    stored = read_run(stopped).run
+    stored = read_run(stopped)
     assert not stored.main.segments
     count = len(stored.main.trace)
     assert 100 < count < len(both.uncompensated.trace)
@@ -145,7 +145,7 @@ def test_report_of_a_run_without_compensation_that_was_stopped(
     stored.main.write(stopped, "_uncompensated")
     assert read_run(stopped).source == stopped / "uncompensated.mcap"
     (stopped / "uncompensated.mcap").unlink()
-    assert read_run(stopped).run.to_json() == stored.to_json()
+    assert read_run(stopped).to_json() == stored.to_json()
 
 
 def test_what_is_no_run_is_named(

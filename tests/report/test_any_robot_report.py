@@ -51,7 +51,7 @@ def test_figures_are_of_each_degree_of_freedom(knows_tip: bool, tip: str) -> Non
     section = run.section()
     assert all(f"<th>{name} [rad]</th>" in section for name in NAMES)
     assert "goal" not in section
-    assert len(run.figure()[1].figure.axes) == len(replay_figure(run.main).axes) == 10
+    assert len(run.figure()[1].axes) == len(replay_figure(run.main).axes) == 10
 
 
 def test_slack_wider_than_the_travel_is_unknown() -> None:
@@ -59,7 +59,7 @@ def test_slack_wider_than_the_travel_is_unknown() -> None:
     run.trace["delta_plus_turn"] = 0.79
     run.trace["delta_plus_bend"] = 0.81
     run.trace["delta_plus_grip"] = 0.0
-    widths = {name: found.width for name, found in estimation_quality(run).items()}
+    widths = {name: found["width"] for name, found in estimation_quality(run).items()}
     assert widths["turn"] == pytest.approx(0.79)  # the command travels 0.8 rad
     assert np.isnan([widths["bend"], widths["grip"]]).all()
 
@@ -70,7 +70,7 @@ def test_both_runs_are_of_one_robot(tmp_path) -> None:
         ("without", recording(1.0, compensated=False)),
     ):
         run.save(tmp_path / name)
-    found = read_run(tmp_path / "with", tmp_path / "without").run
+    found = read_run(tmp_path / "with", tmp_path / "without")
     assert list(found.to_json()) == NAMES
     assert found.main.segments == recording(1.0, compensated=True).segments
     text = (tmp_path / "without" / "config.toml").read_text()

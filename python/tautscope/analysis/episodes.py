@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from tautscope.analysis.models.task import Floats
 from tautscope.analysis.verdict import Verdict, judge
 from tautscope.errors import RecordError
 from tautscope.runs.columns import time_column
@@ -44,34 +45,6 @@ class Request:
     names: tuple[str, ...]
     time: str | None
     missing: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Summary:
-    """The slack of a degree of freedom over all episodes.
-
-    Attributes:
-        identified: Episodes in which it is identified.
-        aligned: Episodes in which it is 0.
-        median: Of the identified widths; NaN without one.
-        low: Lower end of the 95 % interval of the median, by the ranks of the widths; NaN below
-            six widths.
-        high: Its upper end.
-        tenth: Tenth percentile of the widths.
-        ninetieth: Ninetieth percentile.
-        typical: Number of the episode whose width is the median, or next to it; None without one.
-        reasons: Why it is not identified in the others: text of one, its episode, and their number.
-    """
-
-    identified: int
-    aligned: int
-    median: float
-    low: float
-    high: float
-    tenth: float
-    ninetieth: float
-    typical: int | None
-    reasons: tuple[tuple[str, int, int], ...]
 
 
 def judge_all(
@@ -131,39 +104,45 @@ def _row(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def summarize(rows: Sequence[dict[str, Any]]) -> Summary:
-    """The slack over the rows of one degree of freedom."""
+def summarize(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The slack over the rows of one degree of freedom, as in ``tautscope analyze --json``.
+
+    Returns:
+        ``identified`` and ``aligned``: number of episodes in which it is identified, and is 0. Of
+        the identified widths, None without one: ``median``; ``low`` and ``high``, the 95 % interval
+        of the median by their ranks, None below six; ``tenth`` and ``ninetieth`` percentile;
+        ``typical``, the number of the episode whose width is the median, or next to it. ``reasons``
+        why it is not identified in the others: text of one (``missing``), its ``episode``, and
+        their ``count``.
+    """
     known = sorted((row["width"], row["episode"]) for row in rows if row["identified"])
     widths = np.array([width for width, _ in known])
-    low, high = _median_interval(widths)
     others = [row for row in rows if not row["identified"] and not row["aligned"]]
     kinds = [_kind(row["missing"]) for row in others]
-    reasons = []
-    for kind, count in Counter(kinds).most_common():
-        first = others[kinds.index(kind)]
-        reasons.append((first["missing"], first["episode"], count))
-    tenth, median, ninetieth = (
-        np.quantile(widths, (0.1, 0.5, 0.9)) if known else (np.nan, np.nan, np.nan)
-    )
-    return Summary(
-        identified=len(known),
-        aligned=sum(row["aligned"] for row in rows),
-        median=float(median),
-        low=low,
-        high=high,
-        tenth=float(tenth),
-        ninetieth=float(ninetieth),
-        typical=known[len(known) // 2][1] if known else None,
-        reasons=tuple(reasons),
-    )
+    reasons = [
+        {name: others[kinds.index(kind)][name] for name in ("missing", "episode")}
+        | {"count": count}
+        for kind, count in Counter(kinds).most_common()
+    ]
+    shares = {"median": 0.5, "tenth": 0.1, "ninetieth": 0.9}
+    low, high = _median_interval(widths)
+    return {
+        "identified": len(known),
+        "aligned": sum(row["aligned"] for row in rows),
+        "low": low,
+        "high": high,
+        **{name: float(np.quantile(widths, at)) if known else None for name, at in shares.items()},
+        "typical": known[len(known) // 2][1] if known else None,
+        "reasons": reasons,
+    }
 
 
-def _median_interval(ordered: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, float]:
+def _median_interval(ordered: Floats) -> tuple[float, float] | tuple[None, None]:
     """Distribution-free interval of at least 95 %: between the k-th values from both ends."""
     count = len(ordered)
     shares = np.cumsum([math.comb(count, each) / 2**count for each in range(count + 1)])
     k = int(np.searchsorted(shares, 0.025, side="right"))
-    return (float(ordered[k - 1]), float(ordered[count - k])) if k > 0 else (np.nan, np.nan)
+    return (float(ordered[k - 1]), float(ordered[count - k])) if k > 0 else (None, None)
 
 
 def _kind(text: str) -> str:

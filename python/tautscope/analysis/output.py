@@ -15,14 +15,11 @@ from numpy.typing import NDArray
 from tautscope.analysis.comparison import HORIZONS, Analysis
 from tautscope.analysis.compensator import write_compensator
 from tautscope.analysis.models.registry import LINEAR_FIT
-from tautscope.analysis.models.task import Floats, extremes
-from tautscope.analysis.slide import slide
+from tautscope.analysis.models.task import Floats
+from tautscope.analysis.slide import slide, thinned
 from tautscope.analysis.verdict import Verdict
 from tautscope.figure_style import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
-
-PARTS = 2000
-"""Parts of the horizontal axis that are drawn, more than a panel has pixels."""
 
 
 def write_results(
@@ -117,15 +114,6 @@ def _draw_horizons(figure: SubFigure, analysis: Analysis) -> None:
     figure.legend(loc="outside right upper")
 
 
-def _envelope(x: Floats | NDArray[np.int64], y: Floats) -> tuple[NDArray[Any], Floats]:
-    """Samples with the least and the largest y of each of many parts: they draw the same line."""
-    size = -(-len(y) // PARTS)
-    if size <= 2:
-        return x, y
-    kept = extremes(y, size)
-    return x[kept], y[kept]
-
-
 def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
     """A row per model: its error with every tip over the record, and its loop over the measured.
 
@@ -148,7 +136,7 @@ def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
         strip, loop = axes[row]
         strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
         strip.axhline(0, color=GREY, linewidth=0.5)
-        strip.plot(*_envelope(at[measured], errors[row][measured]), color=BLUE, linewidth=0.7)
+        strip.plot(*thinned(at[measured], errors[row][measured]), color=BLUE, linewidth=0.7)
         if not np.isfinite(errors[row][: analysis.half]).any():
             middle = (at[0] + at[analysis.half]) / 2
             strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import textwrap
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tautscope.analysis.delayed_play import turns
 from tautscope.analysis.models.task import Floats, extremes
@@ -70,7 +72,7 @@ def _draw_loop(axes: Axes, verdict: Verdict, shown: slice) -> None:
     known = found.is_identified or found.is_aligned
     x = found.gain * delayed + found.offset if known else record.command
     y = record.measured - found.drift if known else record.measured
-    axes.plot(*_thinned(x[shown], y[shown]), color=ORANGE, linewidth=1.2, label="tip now")
+    axes.plot(*thinned(x[shown], y[shown]), color=ORANGE, linewidth=1.2, label="tip now")
     axes.set_ylabel(_with_unit("tip", record.units[1]))
     if not known:
         axes.set_xlabel(_with_unit("command", record.units[0]))
@@ -79,7 +81,7 @@ def _draw_loop(axes: Axes, verdict: Verdict, shown: slice) -> None:
     if (each := verdict.compensation) is not None:
         last = slice(-min(len(each.reference), 4 * _POINTS), None)
         axes.plot(
-            *_thinned(each.reference[last], each.compensated[last]),
+            *thinned(each.reference[last], each.compensated[last]),
             color=BLUE,
             linewidth=1.6,
             label="with the loop, simulated",
@@ -112,9 +114,9 @@ def _draw_time(axes: Axes, verdict: Verdict, shown: slice) -> None:
     at = record.clock[shown]
     measured = record.measured[shown]
     seen = np.isfinite(measured)
-    axes.plot(*_thinned(at[seen], measured[seen]), color=GREY, linewidth=3, label="measured")
+    axes.plot(*thinned(at[seen], measured[seen]), color=GREY, linewidth=3, label="measured")
     if found.is_related:
-        predicted = _thinned(at, found.predicted[shown])
+        predicted = thinned(at, found.predicted[shown])
         axes.plot(*predicted, color=BLUE, linewidth=1.2, label="predicted")
     axes.set_xlabel("time [s]" if record.is_timed else "sample")
     axes.set_ylabel(_with_unit("tip", record.units[1]))
@@ -122,8 +124,8 @@ def _draw_time(axes: Axes, verdict: Verdict, shown: slice) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
 
 
-def _thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Points of a line that looks the same: the extremes of each of many parts."""
+def thinned(x: NDArray[Any], y: Floats) -> tuple[NDArray[Any], Floats]:
+    """Points (m,) of a line (n,) that looks the same: the extremes of each of many parts."""
     size = max(1, 2 * len(y) // _POINTS)
     kept = extremes(np.nan_to_num(y), size) if size > 2 else np.arange(len(y))
     kept = kept[np.isfinite(y[kept])]

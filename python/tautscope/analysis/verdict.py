@@ -25,7 +25,7 @@ from tautscope.analysis.identification import (
     Identification,
     Interval,
 )
-from tautscope.report.tables import finite_or_none
+from tautscope.report.tables import finite
 from tautscope.runs.records import Record
 
 PARSIMONY = 1.05
@@ -117,7 +117,7 @@ class Verdict:
             "strokes": found.strokes,
             "p_value": found.p_value,
             "missing": found.missing or None,
-            "explanations": {k: finite_or_none(v) for k, v in found.explanations.items()},
+            "explanations": finite(found.explanations),
             "compensation": None
             if self.compensation is None
             else {name: getattr(self.compensation, name) for name in ("before", "after", "helps")},

@@ -29,13 +29,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tautscope.calibration.delay_probes import Fit, Signal, fit_model, fit_turning_points
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
-
-Floats = NDArray[np.float64]
+from tautscope.loop.kinematics import Floats
 
 LIMIT = 5.0
 """Largest magnitude of a delay that is searched, unless another is given [s]."""

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from tautscope._core import Play
 from tautscope.dof import Dof
-
-Floats = NDArray[np.float64]
+from tautscope.loop.kinematics import Floats
 
 RADII = np.linspace(0.0, 0.48, 49)[1:]
 """Half widths of the plays, as shares of the motor's range."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.vision import workspace_starts
-
-Floats = NDArray[np.float64]
 
 _PIXELS = np.full(4, 0.5)  # standard deviation of a feature for the fit [px]
 _BROAD = 3.0  # standard deviation of the start, in distances of the starts

@@ -45,14 +45,14 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.log.alignment import align_log, implausible_motors  # noqa: PLC0415
+    from tautscope.log.alignment import align_recording, implausible_motors  # noqa: PLC0415
     from tautscope.log.reader import read_log  # noqa: PLC0415
 
     check_video_options(options)
     document: dict[str, Any] = {}
     if options.video is None:
         log = read_log(options.file)
-        found = align_log(log, options.within)
+        found = align_recording(log.recording(), options.within)
         camera_delay = log.config.camera.source.delay + found.delay
         document["camera_delay"] = camera_delay if found.is_known else None
         remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import shlex
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import console, print_json, progress_bar
 from tautscope.runs.episodes import Episode
 from tautscope.runs.output_folder import new_folder
-
-if TYPE_CHECKING:
-    from tautscope.analysis.episodes import Summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,47 +61,35 @@ def analyze_episodes(
         episodes_figure(rows, names).savefig(place / "episodes.png")
     found = {name: summarize([row for row in rows if row["name"] == name]) for name in names}
     dofs = [
-        {"name": name, "command": command, "measured": tip} | _to_json(found[name])
+        {"name": name, "command": command, "measured": tip} | found[name]
         for name, (command, tip) in zip(names, pairs, strict=True)
     ]
     print_json(options, {"folder": str(folder), "episodes": len(episodes), "dofs": dofs})
     screen = console()
     for name, (command, tip) in zip(names, pairs, strict=True):
         text = f"{name}: {_text(found[name], len(episodes))}"
-        if found[name].typical is not None:
-            words = ["tautscope", "analyze", options.file, "--episode", str(found[name].typical)]
+        if (typical := found[name]["typical"]) is not None:
+            words = ["tautscope", "analyze", options.file, "--episode", str(typical)]
             more = shlex.join([*words, "--command", command, "--measured", tip])
             text += f" A compensator, from the episode with the median: {more}"
         screen.print(f"{text}\n", soft_wrap=True)
     screen.print(f"All episodes: {folder / 'episodes.csv'}, {Path('episodes.png')}", soft_wrap=True)
 
 
-def _text(found: Summary, count: int) -> str:
-    parts = [f"the slack is identified in {found.identified} of {count} episodes"]
-    if found.identified:
+def _text(found: dict[str, Any], count: int) -> str:
+    parts = [f"the slack is identified in {found['identified']} of {count} episodes"]
+    if found["identified"]:
+        between = ""
+        if found["low"] is not None:
+            between = f" ({found['low']:.3g} to {found['high']:.3g}, 95 % interval of the median)"
         parts[0] += (
-            f": median {found.median:.3g}{_interval(found)}, "
-            f"{found.tenth:.3g} to {found.ninetieth:.3g} in 80 % of them"
+            f": median {found['median']:.3g}{between}, "
+            f"{found['tenth']:.3g} to {found['ninetieth']:.3g} in 80 % of them"
         )
-    if found.aligned:
-        parts.append(f"In {found.aligned} it is 0")
-    for reason, episode, number in found.reasons:
-        parts.append(f"Not in {number}, such as episode {episode}: {reason}")
-    return ". ".join(parts) + "."
-
-
-def _interval(found: Summary) -> str:
-    known = math.isfinite(found.low)
-    return f" ({found.low:.3g} to {found.high:.3g}, 95 % interval of the median)" if known else ""
-
-
-def _to_json(found: Summary) -> dict[str, Any]:
-    numbers = asdict(found)
-    reasons = [
-        dict(zip(("missing", "episode", "count"), each, strict=True)) for each in found.reasons
+    if found["aligned"]:
+        parts.append(f"In {found['aligned']} it is 0")
+    parts += [
+        f"Not in {reason['count']}, such as episode {reason['episode']}: {reason['missing']}"
+        for reason in found["reasons"]
     ]
-    plain = {
-        key: None if isinstance(value, float) and math.isnan(value) else value
-        for key, value in numbers.items()
-    }
-    return plain | {"reasons": reasons}
+    return ". ".join(parts) + "."

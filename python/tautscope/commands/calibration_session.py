@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping
 from html import escape
@@ -16,7 +15,7 @@ from tautscope.commands.arguments import article_config
 from tautscope.config import Config, dump_config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
-from tautscope.report.report import document
+from tautscope.report.report import document, embedded
 
 
 class SessionState(msgspec.Struct, forbid_unknown_fields=True):
@@ -109,11 +108,7 @@ class CalibrationSession:
             if found["values"]:
                 parts.append(_table(found["values"], found["std"]))
             for file, caption in found["figures"]:
-                code = base64.b64encode((self.folder / file).read_bytes()).decode()
-                parts.append(
-                    f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{code}">'
-                    f"<figcaption>{escape(caption)}</figcaption></figure>"
-                )
+                parts.append(embedded((self.folder / file).read_bytes(), "png", caption))
         parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
         kind = "a simulated rig" if self.state.seed is not None else "the rig"
         return document("Calibration", f"Calibration of {kind} of {self._file}.", "\n".join(parts))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,9 @@ from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
-from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
+from tautscope.report.operator_motion import OPERATOR_ROWS
+from tautscope.report.results import ROWS
+from tautscope.report.rows import Row
 from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
@@ -83,7 +86,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.report import demo, tables  # noqa: PLC0415
+    from tautscope.report import demo  # noqa: PLC0415
 
     if options.robot is not None:
         _run_robot(options)
@@ -108,16 +111,7 @@ def _run(options: argparse.Namespace) -> None:
     with recording_saved(folder), progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
-    document = tables.to_json(
-        config.profile,
-        seeds,
-        found.results,
-        found.operator_results,
-        sim_seconds=found.sim_seconds,
-        wall_seconds=found.wall_seconds,
-        article_results=found.article_results,
-    )
-    print_json(options, {"folder": str(folder), **document})
+    print_json(options, {"folder": str(folder), **found.to_json()})
     _print_table1(found)
     _print_operator_motion(found)
     _print_facts(found, folder)
@@ -154,27 +148,22 @@ def _title(text: str, seeds: int) -> str:
     return f"{text} (median of {seeds} seeds, worst in brackets)" if seeds > 1 else text
 
 
-def _cell(
-    row: Row,
-    dof: NamedDof,
-    median: dict[NamedDof, Any],
-    worst: dict[NamedDof, Any],
-    *,
-    several: bool,
-) -> str:
-    """A figure of a DOF, with the worst one in brackets if there are several seeds."""
+def _cell(row: Row, dof: NamedDof, results: Sequence[dict[NamedDof, Any]]) -> str:
+    """The median of a figure of a DOF, and of several seeds the worst one in brackets."""
     from tautscope.report import tables  # noqa: PLC0415
+    from tautscope.report.results import combine  # noqa: PLC0415
 
-    middle, bad = (tables.cell(row, dof, getattr(of[dof], row.name)) for of in (median, worst))
-    return f"{middle} ({bad})" if several else middle
+    middle, bad = (
+        tables.cell(row, dof, getattr(combine(results, how)[dof], row.name))
+        for how in ("median", "worst")
+    )
+    return f"{middle} ({bad})" if len(results) > 1 else middle
 
 
 def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
 
     profiles, dofs = demo.by_profile, list(demo.results[0])
-    several = len(demo.seeds) > 1
-    figures = [(tables.median(results), tables.worst(results)) for results in profiles.values()]
     headings, rows = [""], []
     for dof in dofs:
         headings += [f"{tables.heading(dof)}\narticle", *(f"\n{name}" for name in profiles)]
@@ -182,7 +171,7 @@ def _print_table1(demo: Demo) -> None:
         cells = []
         for dof in dofs:
             cells.append(tables.article_cell(row, dof))
-            cells += [_cell(row, dof, *each, several=several) for each in figures]
+            cells += [_cell(row, dof, results) for results in profiles.values()]
         rows.append([row.title, *cells])
     title = _title("Table 1: the article, and the twin", len(demo.seeds))
     print_table(headings, rows, title=title, dim=range(1, len(headings), len(profiles) + 1))
@@ -193,14 +182,10 @@ def _print_operator_motion(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
 
     results = demo.operator_results
-    several = len(results) > 1
-    middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
-    rows = [
-        [row.title, *(_cell(row, dof, middle, bad, several=several) for dof in middle)]
-        for row in OPERATOR_ROWS
-    ]
+    dofs = list(results[0])
+    rows = [[row.title, *(_cell(row, dof, results) for dof in dofs)] for row in OPERATOR_ROWS]
     title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
-    headings = ["", *map(tables.heading, middle)]
+    headings = ["", *map(tables.heading, dofs)]
     print_table(headings, rows, title=_title(title, len(results)))
     print("Errors of the true tip, after the first 40 s.\n")
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from tautscope.commands.printing import print_json, print_table
-from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
-from tautscope.report.tables import finite_or_none
+from tautscope.log.comparison import estimation_quality, write_replay
+from tautscope.report.tables import finite
 from tautscope.runs.recording import Recording
 
 
@@ -35,9 +34,9 @@ def write_estimates(
     write_replay(folder, replayed, recorded)
     after = estimation_quality(replayed, recorded)
     before = None if recorded is None else estimation_quality(recorded)
-    dofs = {label: {"replayed": _finite(figures)} for label, figures in after.items()}
+    dofs = {label: {"replayed": finite(figures)} for label, figures in after.items()}
     for label, figures in (before or {}).items():
-        dofs[label]["recorded"] = _finite(figures)
+        dofs[label]["recorded"] = finite(figures)
     images = len(replayed.frames)
     print_json(options, {"folder": str(folder), "images": images, **facts, "dof": dofs})
     _print_table(replayed, before, after)
@@ -46,8 +45,8 @@ def write_estimates(
 
 def _print_table(
     replayed: Recording,
-    before: dict[str, EstimationQuality] | None,
-    after: dict[str, EstimationQuality],
+    before: dict[str, dict[str, float]] | None,
+    after: dict[str, dict[str, float]],
 ) -> None:
     noun = "measurements" if replayed.config.dof else "images"
     dofs = replayed.config.dofs
@@ -65,7 +64,7 @@ def _print_table(
         cells = []
         for dof in dofs:
             pair = [each[dof.label] for each in (before, after) if each is not None]
-            cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
+            cells += [_cell(each[name], name, dof.display_scale) for each in pair]
         if any(cells):
             rows.append([title, *cells])
     title = f"Estimates from {len(replayed.frames)} {noun}"
@@ -76,7 +75,3 @@ def _cell(value: float, name: str, scale: float) -> str:
     if math.isnan(value):
         return "unknown" if name == "width" else ""
     return f"{100 * value:.0f} %" if name == "seen" else f"{scale * value:.3g}"
-
-
-def _finite(figures: EstimationQuality) -> dict[str, float | None]:
-    return {name: finite_or_none(value) for name, value in asdict(figures).items()}

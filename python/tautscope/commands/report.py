@@ -8,7 +8,6 @@ from pathlib import Path
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.commands.result_lines import print_results
-from tautscope.report.run_folder import write_report
 from tautscope.runs.output_folder import new_folder
 
 
@@ -40,15 +39,14 @@ def _run(options: argparse.Namespace) -> None:
     from tautscope.log.stored_run import read_run  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
-    stored = read_run(options.path, options.uncompensated)
-    recording = stored.run.main
+    run = read_run(options.path, options.uncompensated)
+    recording = run.main
     time, seen = recording.trace["time"], "measurements" if recording.config.dof else "images"
     facts = {
-        "run": str(stored.source),
+        "run": str(run.source),
         "recorded": f"{time[-1] - time[0]:.1f} s, {len(recording.frames)} {seen}",
     }
     with new_folder(folder) as place:
-        write_report(stored.run, place, facts)
-    document = {"folder": str(folder), "source": str(stored.source), **stored.run.summary()}
-    print_json(options, document)
-    print_results(stored.run, folder)
+        run.write_report(place, facts)
+    print_json(options, {"folder": str(folder), "source": str(run.source), **run.summary()})
+    print_results(run, folder)

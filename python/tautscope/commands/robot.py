@@ -15,7 +15,6 @@ from tautscope.hardware.signals import exit_on_signals
 from tautscope.loop.rig import Rig
 from tautscope.report.operator_motion import motion_of
 from tautscope.report.recorded_run import RecordedRun
-from tautscope.report.run_folder import write_report
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import recording_saved
 from tautscope.runs.recording import Recording
@@ -72,7 +71,7 @@ def run(
                 rig.close()
             runs[-1].write(folder, suffix)
     found = RecordedRun(runs[1], runs[0])
-    write_report(found, folder, {"rig": name})
+    found.write_report(folder, {"rig": name})
     (folder / "run.json").write_text(json.dumps(found.summary(), indent=1), encoding="utf-8")
     print_json(options, {"folder": str(folder), **found.summary()})
     print_results(found, folder)

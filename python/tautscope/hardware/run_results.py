@@ -13,8 +13,6 @@ from tautscope.dof import Dof
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary
 from tautscope.report.recorded_run import RecordedRun
-from tautscope.report.report import CaptionedFigure
-from tautscope.report.run_folder import write_report
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.recording import Recording, Table
 
@@ -72,7 +70,8 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
 
     first, recorded = run.compensated, run.recorded
     first.recording.write(folder)
-    timing = CaptionedFigure(
+    timing = (
+        "timing.png",
         timing_figure(first.timing),
         "Timing of the run. (a), (b) delay of each set-point after its due time; "
         "(c), (d) age of each frame when the loop took it.",
@@ -84,7 +83,7 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
         "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
         "log": first.log.path.name,
     }
-    write_report(recorded, folder, facts, [("timing.png", timing)])
+    recorded.write_report(folder, facts, [timing])
     (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
     first.timing.write(folder)
 

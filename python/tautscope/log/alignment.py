@@ -6,20 +6,16 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.calibration.delay import LIMIT, DelayEstimate, estimate_delay
 from tautscope.calibration.tip_states import tip_states
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
-from tautscope.log.reader import Log
 from tautscope.loop.rig import Frame
 from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector, workspace_starts
-from tautscope.runs.recording import Recording, per_dof, per_feature
-
-Floats = NDArray[np.float64]
+from tautscope.runs.recording import Floats, Recording, per_dof, per_feature
 
 PLAUSIBLE_GAINS = 0.3, 3.0
 """Travel of the tip over that of its motor in contact."""
@@ -75,11 +71,6 @@ def align_video(
     clock = np.array(stamps)
     tips = tip_states(np.array(features), config)
     return estimate_delay(times, positions, clock, tips, limit), clock
-
-
-def align_log(log: Log, limit: float = LIMIT) -> DelayEstimate:
-    """Estimate the delay of the images of a log behind its commands; see `align_recording`."""
-    return align_recording(log.recording(), limit)
 
 
 def align_recording(recording: Recording, limit: float = LIMIT) -> DelayEstimate:

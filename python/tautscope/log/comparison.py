@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -16,42 +15,29 @@ from tautscope.runs.recording import Recording, Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAN = float("nan")
 LEAST_SEEN = 10
 """Updates in which a DOF was observable, below which its backlash is unknown."""
 
 
-@dataclass(frozen=True, slots=True)
-class EstimationQuality:
-    """Quality of the estimates of one DOF in a run [m or rad]; NaN where unknown.
-
-    Attributes:
-        width: Backlash width at the end, delta_plus - delta_minus; NaN if the motor travelled less
-            than that, or fewer than `LEAST_SEEN` updates showed the DOF.
-        seen: Share of the updates in which the DOF was observable.
-        state_rms: RMS error of the estimate over these images, if the true state is known.
-        change_rms: RMS difference from the estimate of the other run, over the images in which the
-            DOF was observable in both.
-    """
-
-    width: float
-    seen: float
-    state_rms: float
-    change_rms: float
-
-
 def estimation_quality(
     run: Recording, other: Recording | None = None
-) -> dict[str, EstimationQuality]:
-    """Quality of the estimates by DOF, compared with another run on the same inputs."""
+) -> dict[str, dict[str, float]]:
+    """Quality of the estimates by DOF [m or rad]; NaN where unknown.
+
+    Returns:
+        Of each DOF ``width``, the backlash width delta_plus - delta_minus at the end, NaN if the
+        motor travelled less than that, or fewer than `LEAST_SEEN` updates showed the DOF; ``seen``,
+        the share of the updates in which the DOF was observable; ``state_rms``, the RMS error of
+        the estimate over these, if the true state is known; and ``change_rms``, its RMS difference
+        from another run on the same inputs, over the updates that showed the DOF in both.
+    """
     return {dof.label: _quality(run, other, dof.label) for dof in run.config.dofs}
 
 
-def _quality(run: Recording, other: Recording | None, name: str) -> EstimationQuality:
+def _quality(run: Recording, other: Recording | None, name: str) -> dict[str, float]:
     frames = run.frames
     seen = frames[f"observable_{name}"]
     error = (frames[f"estimate_{name}"] - frames[f"true_{name}"])[seen]
-    error = error[np.isfinite(error)]
     change = np.empty(0)
     if other is not None:
         _, mine, theirs = np.intersect1d(
@@ -63,18 +49,18 @@ def _quality(run: Recording, other: Recording | None, name: str) -> EstimationQu
             for table, rows in ((frames, mine), (other.frames, theirs))
         ]
         change = values[0] - values[1]
-    width = float(_width(run.trace[-1:], name)[0]) if len(run.trace) else NAN
+    width = float(_width(run.trace[-1:], name)[0]) if len(run.trace) else np.nan
     # No travel shows slack wider than itself; 0 is the estimate before any.
     is_known = (
         0 < width <= float(np.ptp(run.trace[f"command_{name}"]))
         and np.count_nonzero(seen) >= LEAST_SEEN
     )
-    return EstimationQuality(
-        width=width if is_known else NAN,
-        seen=float(np.mean(seen)) if len(seen) else NAN,
-        state_rms=metrics.rms(error) if len(error) else NAN,
-        change_rms=metrics.rms(change) if len(change) else NAN,
-    )
+    return {
+        "width": width if is_known else np.nan,
+        "seen": float(np.mean(seen)) if len(seen) else np.nan,
+        "state_rms": metrics.rms(error),
+        "change_rms": metrics.rms(change),
+    }
 
 
 def _width(trace: Table, name: str) -> NDArray[np.float64]:

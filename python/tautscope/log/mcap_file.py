@@ -68,7 +68,6 @@ class McapFile:
         }
         self._chunks: list[ChunkIndex] = []
         self._body, self._indices = RecordBuilder(), dict[int, MessageIndex]()
-        self._spans: list[tuple[int, int]] = []
         self._put(MCAP0_MAGIC + _bytes(Header("ros2", f"tautscope {__version__}")))
         for record in (*self._schemas.values(), *self._channels.values()):
             record.write(self._body)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import RecordError
@@ -19,13 +18,13 @@ from tautscope.log import topics
 from tautscope.log.cdr import Message
 from tautscope.log.fields import header_of, joint_state, multi_array, stamp_of
 from tautscope.log.measurements import measurement_messages, read_measurement, value_names
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report, Status
 from tautscope.loop.rig import Frame, Sample
 from tautscope.runs.recording import FEATURES, update_columns
 from tautscope.runs.run_recorder import Row, update_row
 
-Floats = NDArray[np.float64]
 Messages = dict[str, bytes]
 """Topic -> CDR."""
 

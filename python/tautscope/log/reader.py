@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.records import Message
@@ -22,7 +23,7 @@ from tautscope.log.mcap_records import Damage, read_messages, read_records
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Sample
-from tautscope.runs.recording import Recording, update_columns
+from tautscope.runs.recording import Floats, Recording, update_columns
 from tautscope.runs.run_recorder import Row, RunRecorder
 
 
@@ -31,8 +32,8 @@ class Tick:
     """A recorded control tick; the sample has no frame."""
 
     sample: Sample
-    reference: msg.Floats
-    command: msg.Floats
+    reference: Floats
+    command: Floats
     made_at: float | None
     raw: msg.Messages
 
@@ -42,10 +43,17 @@ class Update:
     """A recorded update: its `update_row`, the offsets after it, and its measurement if any."""
 
     row: Row
-    delta_minus: msg.Floats
-    delta_plus: msg.Floats
+    delta_minus: Floats
+    delta_plus: Floats
     measurement: Measurement | None
     raw: msg.Messages
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """Level, name and message of its status, and further texts by key under ``values``."""
+        (status,) = topics.decode(topics.STATUS, self.raw[topics.STATUS])["status"]
+        texts = {each["key"]: each["value"] for each in status["values"]}
+        return {**status, "values": texts}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +102,19 @@ class Log:
         return isinstance(event, Update) and (
             event.measurement is not None or self.has_image(index)
         )
+
+    @cached_property
+    def clock(self) -> msg.Clock:
+        """Conversion from the rig's clock to the wall clock.
+
+        Raises:
+            RecordError: The log has no tick.
+        """
+        tick = next((event for event in self.events.values() if isinstance(event, Tick)), None)
+        if tick is None:
+            raise RecordError("log", str(self.path), "a log with a control tick")
+        stamp = topics.decode(topics.APPLIED, tick.raw[topics.APPLIED])["header"]["stamp"]
+        return msg.Clock(tick.sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
 
     @property
     def missing(self) -> int:

@@ -9,32 +9,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.calibration.delay import DelayEstimate
 from tautscope.config import Config
 from tautscope.errors import ConfigError, RecordError
 from tautscope.log import messages as msg
-from tautscope.log import topics
 from tautscope.log.reader import Log, Request, Tick, Update
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
-from tautscope.runs.recording import FEATURES, Recording
+from tautscope.runs.recording import FEATURES, Floats, Recording
 from tautscope.runs.run_recorder import RunRecorder, update_row
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
 
-Floats = NDArray[np.float64]
 PREPARE = "prepare_detection "
 """Begin of the request to prepare the detection of a frame, before its sequence number."""
-Seen = tuple[float, Frame | Measurement, int]
+SeenFrame = tuple[float, Frame, int]
+Seen = SeenFrame | tuple[float, Measurement, int]
 """Arrival time [s] of what an update saw, this, and its sequence number."""
 Inputs = Iterator[Tick | Seen]
 """Ticks, and frames or measurements, in the order of the run."""
@@ -80,8 +77,8 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     """
     loop = HysteresisReduction(log.config, log.compensated)
     comparison, recorder = Comparison(), RunRecorder(log.config)
-    clock, codec = _clock(log), msg.Codec(log.config)
-    prepared: dict[int, tuple[Seen, Callable[[], Report]]] = {}
+    clock, codec = log.clock, msg.Codec(log.config)
+    prepared: dict[int, tuple[SeenFrame, Callable[[], Detection]]] = {}
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
@@ -93,19 +90,15 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             where = f"tick at {sample.time:g} s"
             comparison.same_ticks += _is_same(comparison, event, replayed, where)
         elif isinstance(event, Request) and event.text.startswith(PREPARE):
-            if (found := _prepared_frame(log, index, event.text)) is not None:
-                update, now, frame = found
-                finish = partial(_finish, loop, frame, loop.prepare_detection(frame))
-                prepared[update] = (now, frame, frame.sequence), finish
+            if (found := _prepared_update(log, index, event.text)) is not None:
+                update, shown = found
+                prepared[update] = shown, loop.prepare_detection(shown[1])
         elif isinstance(event, Request):
             _send_request(loop, event.text)
         elif event is not None and log.has_input(index):
-            if index in prepared:
-                (now, seen, count), end = prepared.pop(index)
-                report = end()
-            else:
-                now, seen, count = _seen(log, index, event)
-                report = _update(loop, seen)
+            ready = prepared.pop(index, None)
+            now, seen, count = ready[0] if ready else _seen(log, index)
+            report = loop.on_detection(ready[0][1], ready[1]()) if ready else _update(loop, seen)
             row = update_row(now, seen, report, count)
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
             replayed = codec.update(clock, now, seen, report, count)
@@ -119,21 +112,19 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     return comparison, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
 
 
-def _prepared_frame(log: Log, after: int, request: str) -> tuple[int, float, Frame] | None:
-    """The next image update, its arrival time [s] and frame, if `request` prepared its detection.
+def _prepared_update(log: Log, after: int, request: str) -> tuple[int, SeenFrame] | None:
+    """The next update and its frame, if `request` prepared its detection.
 
     None if the detection had not ended when the run did, or its image is not in the log.
     """
-    for index in range(after + 1, max(log.events) + 1):
-        event = log.events.get(index)
-        if isinstance(event, Update):
-            if not log.has_image(index):
-                return None
-            now, frame, count = _seen(log, index, event)
-            if isinstance(frame, Frame) and request == f"{PREPARE}{count}":
-                return index, now, frame
-            return None
-    return None
+    later = range(after + 1, next(reversed(log.events)) + 1)
+    index = next((each for each in later if isinstance(log.events.get(each), Update)), None)
+    if index is None or not log.has_image(index):
+        return None
+    now, frame, count = _seen(log, index)
+    if not isinstance(frame, Frame) or request != f"{PREPARE}{count}":
+        return None
+    return index, (now, frame, count)
 
 
 def _send_request(loop: HysteresisReduction, request: str) -> None:
@@ -165,16 +156,10 @@ def _is_same(
     return not different
 
 
-def _clock(log: Log) -> msg.Clock:
-    ticks = [event for event in log.events.values() if isinstance(event, Tick)]
-    if not ticks:
-        raise RecordError("log", str(log.path), "one with at least one tick")
-    stamp = topics.decode(topics.COMMAND, ticks[0].raw[topics.COMMAND])["header"]["stamp"]
-    return msg.Clock(ticks[0].sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
-
-
-def _seen(log: Log, index: int, update: Update) -> Seen:
+def _seen(log: Log, index: int) -> Seen:
     """Frame or measurement of a recorded update, as the loop got it."""
+    update = log.events[index]
+    assert isinstance(update, Update)
     row: dict[str, Any] = dict(zip(log.update_names, update.row, strict=True))
     now, count = float(row["arrived_at"]), int(row["sequence"])
     if update.measurement is not None:
@@ -182,10 +167,6 @@ def _seen(log: Log, index: int, update: Update) -> Seen:
     truth = np.array([row[f"true_features_{name}"] for name in FEATURES], np.float64)
     known = None if np.isnan(truth).all() else truth
     return now, Frame(log.image(index), float(row["captured_at"]), count, known), count
-
-
-def _finish(loop: HysteresisReduction, frame: Frame, detect: Callable[[], Detection]) -> Report:
-    return loop.on_detection(frame, detect())
 
 
 def _update(loop: HysteresisReduction, seen: Frame | Measurement) -> Report:
@@ -256,7 +237,7 @@ def _log_inputs(log: Log) -> Inputs:
             yield event
         # Requests are left out: their effect on the motors is in the recorded commands.
         elif isinstance(event, Update) and log.has_input(index):
-            yield _seen(log, index, event)
+            yield _seen(log, index)
 
 
 def _video_inputs(

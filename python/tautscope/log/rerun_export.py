@@ -15,12 +15,11 @@ from rerun.chunk import Chunk
 from rerun.encodings import Utf8Like
 
 from tautscope.config import Config
-from tautscope.errors import OutputError, RecordError
+from tautscope.errors import OutputError
 from tautscope.figure_style import AMBER, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
 from tautscope.log import topics
 from tautscope.log.mcap_records import Damage, read_messages
-from tautscope.log.messages import Clock
-from tautscope.log.reader import Log, Tick, Update, read_log
+from tautscope.log.reader import Log, Update, read_log
 from tautscope.runs.output_folder import new_file
 from tautscope.runs.recording import Recording
 
@@ -86,11 +85,7 @@ class _Chunks:
     def __init__(self, log: Log) -> None:
         self._log = log
         self.images = 0
-        tick = next((event for event in log.events.values() if isinstance(event, Tick)), None)
-        if tick is None:
-            raise RecordError("log", str(log.path), "a log with a control tick")
-        stamp = topics.decode(topics.APPLIED, tick.raw[topics.APPLIED])["header"]["stamp"]
-        self._clock = Clock(tick.sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
+        self._clock = log.clock
         self.recording_id = f"{log.path.stem}-{self._clock.epoch}"
 
     def all(self) -> Iterator[Chunk]:
@@ -146,8 +141,8 @@ class _Chunks:
         for event in self._log.events.values():
             if not isinstance(event, Update):
                 continue
-            status = topics.decode(topics.STATUS, event.raw[topics.STATUS])["status"][0]
-            values = {each["key"]: each["value"] for each in status["values"]}
+            status = event.status
+            values = status["values"]
             text = f"{status['name']}: {status['message']}, reaction: {values['reaction']}"
             text += f", warnings: {values['warnings']}" if values["warnings"] else ""
             if text != previous:

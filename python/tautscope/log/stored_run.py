@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from tautscope.errors import MissingPathError, RecordError
-from tautscope.log import topics
 from tautscope.log.reader import Log, Update, read_log
 from tautscope.loop.safety import Reaction, disabled_monitors
 from tautscope.report.recorded_run import RecordedRun
@@ -24,24 +23,13 @@ LEAST_DURATION = 1.0
 """Of a run that is evaluated [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class StoredRun:
-    """A stored run.
-
-    Attributes:
-        run: Its recordings, with their warnings. Of an experiment that ended early the segments
-            that are complete; if there is none, it counts as another motion.
-        source: Where its main run was read from.
-    """
-
-    run: RecordedRun
-    source: Path
-
-
 def read_run(
     path: str | PathLike[str], uncompensated: str | PathLike[str] | None = None
-) -> StoredRun:
+) -> RecordedRun:
     """Read a run, and if it has compensation the one without beside it, if there is one.
+
+    The recordings have their warnings. Of an experiment that ended early they have the segments
+    that are complete; without one it counts as another motion.
 
     Args:
         path: A log; a folder with ``compensated.mcap`` and perhaps ``uncompensated.mcap``, or with
@@ -64,7 +52,7 @@ def read_run(
             raise RecordError("--uncompensated", str(uncompensated), "a run without compensation")
     if plain is not None:
         _check_same_reference(plain, main, str(uncompensated or source))
-    return StoredRun(RecordedRun(main, plain), source)
+    return RecordedRun(main, plain, source)
 
 
 def _find(place: Path) -> tuple[Path, Recording, Recording | None]:
@@ -114,8 +102,7 @@ def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
     summary = FlagSummary(recording.config)
     elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
     for at, (_, update) in zip(elapsed, _updates(log), strict=True):
-        (status,) = topics.decode(topics.STATUS, update.raw[topics.STATUS])["status"]
-        values = {each["key"]: each["value"] for each in status["values"]}
+        values = update.status["values"]
         summary.add(float(at), values["warnings"].split(","), Reaction(values["reaction"]))
     return summary.lines(summary.names)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 from tautscope._core import __version__
 from tautscope.config import Config
@@ -17,12 +18,14 @@ from tautscope.report.operator_motion import (
     evaluate_operator_motion,
     operator_motion,
 )
-from tautscope.report.report import FIGURE5_CAPTION, CaptionedFigure
-from tautscope.report.results import Results, evaluate
-from tautscope.report.rows import OPERATOR_ROWS, ROWS
+from tautscope.report.report import FIGURE5_CAPTION
+from tautscope.report.results import ROWS, Results, combine, evaluate
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
 from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _CAVEATS = """
 <ul class="note">
@@ -63,35 +66,38 @@ _FILM_CAPTION = (
 
 @dataclass(frozen=True)
 class Demo:
-    """Results of ``tautscope demo``.
+    """Results of ``tautscope demo``; recordings are those of the first seed.
 
     Attributes:
         config: Configuration of the first seed.
         seeds: The seed of each result.
-        results: Table 1 of each seed.
-        uncompensated: The first seed's run without compensation.
-        compensated: The first seed's run with it.
+        by_profile: Table 1 of each seed by profile; the configuration's own profile is the last.
+        uncompensated: The run without compensation.
+        compensated: The run with it.
+        article: The same with profile ``paper``, if the configuration has another one.
         operator_results: The figures of the operator motion of each seed.
-        operator_uncompensated: The first seed's operator motion without compensation.
-        operator_compensated: The first seed's operator motion with it.
+        operator_uncompensated: The operator motion without compensation.
+        operator_compensated: The operator motion with it.
         sim_seconds: Simulated time of all runs [s].
         wall_seconds: Computing time [s].
-        article_results: Table 1 of each seed with profile ``paper``, if `config` has another one.
-        article: The first seed's compensated run with profile ``paper``, likewise.
     """
 
     config: Config
     seeds: tuple[int, ...]
-    results: tuple[Results, ...]
+    by_profile: dict[str, tuple[Results, ...]]
     uncompensated: Recording
     compensated: Recording
+    article: Recording | None
     operator_results: tuple[OperatorResults, ...]
     operator_uncompensated: Recording
     operator_compensated: Recording
     sim_seconds: float
     wall_seconds: float
-    article_results: tuple[Results, ...] = ()
-    article: Recording | None = None
+
+    @property
+    def results(self) -> tuple[Results, ...]:
+        """Table 1 of each seed."""
+        return self.by_profile[self.config.profile]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -99,11 +105,23 @@ class Demo:
         marked = (f"operator motion: {line}" for line in self.operator_compensated.warnings)
         return (*self.compensated.warnings, *marked)
 
-    @property
-    def by_profile(self) -> dict[str, tuple[Results, ...]]:
-        """Table 1 of each seed by profile; the configuration's own profile is the last."""
-        article = {"paper": self.article_results} if self.article_results else {}
-        return {**article, self.config.profile: self.results}
+    def to_json(self) -> dict[str, Any]:
+        """The output of ``tautscope demo --json``; an unknown figure is None.
+
+        Medians over the seeds, and under ``worst`` the worst values; insertion in mm. Under
+        ``paper`` the results of the article's scheme, if it was run beside another one. Under
+        ``hand`` the medians of the operator motion's figures, in m and rad.
+        """
+        *article, (profile, results) = self.by_profile.items()
+        return {
+            "profile": profile,
+            "seeds": list(self.seeds),
+            "dof": tables.summary(results),
+            **{name: tables.summary(each) for name, each in article},
+            "hand": tables.operator_to_json(combine(self.operator_results, "median")),
+            "sim_seconds": self.sim_seconds,
+            "wall_seconds": self.wall_seconds,
+        }
 
 
 def run_demo(
@@ -126,20 +144,21 @@ def run_demo(
     recordings = run_trials(trials, progress, make_rig)
     kinds = len(recordings) // len(configs)
     free, *runs, operator, operator_free = (recordings[first::kinds] for first in range(kinds))
-    results = [tuple(map(evaluate, free, compensated)) for compensated in runs]
     return Demo(
         config=configs[0],
         seeds=tuple(seeds),
-        results=results[0],
+        by_profile={
+            str(compensated[0].config.profile): tuple(map(evaluate, free, compensated))
+            for compensated in reversed(runs)
+        },
         uncompensated=free[0],
         compensated=runs[0][0],
+        article=runs[1][0] if len(runs) > 1 else None,
         operator_results=tuple(map(evaluate_operator_motion, operator_free, operator)),
         operator_uncompensated=operator_free[0],
         operator_compensated=operator[0],
         sim_seconds=sum(float(run.trace["time"][-1] - run.trace["time"][0]) for run in recordings),
         wall_seconds=time.perf_counter() - started,
-        article_results=results[1] if len(results) > 1 else (),
-        article=runs[1][0] if len(runs) > 1 else None,
     )
 
 
@@ -173,17 +192,19 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     from tautscope.report.film import write_film  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-    figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
-    captioned = [CaptionedFigure(figure9, _figure9_caption(demo))]
-    if demo.compensated.snapshot is not None:
-        captioned.append(
-            CaptionedFigure(
-                figures.figure5(demo.compensated.snapshot, demo.config),
-                FIGURE5_CAPTION,
-            )
+    drawn = {
+        "fig9": (
+            figures.figure9(demo.uncompensated, demo.compensated, demo.article),
+            _figure9_caption(demo),
         )
-    operator_figure = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)
-    captioned.append(CaptionedFigure(operator_figure, _OPERATOR_CAPTION.format(demo.seeds[0])))
+    }
+    if demo.compensated.snapshot is not None:
+        figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
+        drawn["fig5"] = figure5, FIGURE5_CAPTION
+    drawn["operator_motion"] = (
+        draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
+        _OPERATOR_CAPTION.format(demo.seeds[0]),
+    )
     with new_folder(folder) as place:
         demo.operator_compensated.write(place, "_operator_motion")
         demo.operator_uncompensated.write(place, "_operator_motion_uncompensated")
@@ -191,17 +212,15 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         demo.uncompensated.write(place, "_uncompensated")
         tables.write_csv(place / "table1.csv", demo.seeds, demo.by_profile)
         motions = {str(demo.config.profile): demo.operator_results}
-        tables.write_csv(place / "operator_motion.csv", demo.seeds, motions, OPERATOR_ROWS)
+        tables.write_csv(place / "operator_motion.csv", demo.seeds, motions)
         with style():
-            figure9.savefig(place / "fig9.png")
-            figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
-            operator_figure.savefig(place / "operator_motion.png")
-            operator_figure.savefig(place / "operator_motion.pdf", metadata={"CreationDate": None})
-            for each in captioned[1:-1]:
-                each.figure.savefig(place / "fig5.png")
+            for name, (figure, _) in drawn.items():
+                figure.savefig(place / f"{name}.png")
+                if name != "fig5":
+                    figure.savefig(place / f"{name}.pdf", metadata={"CreationDate": None})
         film = place / "film.gif"
         write_film(film, demo.operator_uncompensated, demo.operator_compensated)
-        page = demo_report(demo, captioned, film.read_bytes())
+        page = demo_report(demo, drawn.values(), film.read_bytes())
         (place / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -217,7 +236,7 @@ def _figure9_caption(demo: Demo) -> str:
     )
 
 
-def demo_report(demo: Demo, figures: Sequence[CaptionedFigure], film: bytes) -> str:
+def demo_report(demo: Demo, figures: Iterable[tuple[Figure, str]], film: bytes) -> str:
     """The page of ``tautscope demo``, with an animated GIF of the operator's motion."""
     seeds, profiles = demo.seeds, demo.by_profile
     several = len(seeds) > 1
@@ -235,7 +254,7 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure], film: bytes) -> 
         f"on a simulated instrument, camera images the only feedback; {count}",
         f"""{report.embedded(film, "gif", _FILM_CAPTION)}
 <h2>Table 1</h2>
-<div class="wide">{report.results_table(profiles)}</div>
+<div class="wide">{report.figures_table(profiles, ROWS, "true tip")}</div>
 <p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
             " ".join(_PROFILES[name] for name in profiles)
         }

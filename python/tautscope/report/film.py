@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from tautscope.loop.construction import build_feature_model
 from tautscope.report.operator_motion import EVALUATED_AFTER
-from tautscope.runs.recording import Recording, per_dof
+from tautscope.runs.recording import Floats, Recording, per_dof
 from tautscope.twin import Twin
 from tautscope.twin.camera import TwinCamera
 
 Image = NDArray[np.uint8]
-Floats = NDArray[np.float64]
 
 SECONDS, RATE = 10.0, 10.0
 """Length of the film [s], and its images per second."""

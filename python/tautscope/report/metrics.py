@@ -133,11 +133,8 @@ def start_periods(widths: ArrayLike) -> float:
     Returns:
         Number of periods before the settled ones; NaN if the final width is not known.
     """
-    values = np.asarray(widths, dtype=np.float64)
-    if values.size == 0 or not np.isfinite(values[-1]):
-        return np.nan
-    unsettled = ~(np.abs(values) <= SETTLED * abs(values[-1]))
-    return float(np.flatnonzero(unsettled)[-1] + 1) if unsettled.any() else 0.0
+    values = np.abs(np.asarray(widths, dtype=np.float64))
+    return until_within(values, 0.0, SETTLED * values[-1]) if values.size else np.nan
 
 
 def period_widths(

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config, Sine
 from tautscope.dof import NamedDof
 from tautscope.errors import ConfigError
 from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
+from tautscope.report.rows import figure, rows_of
 from tautscope.report.tracking_bound import tracking_bound
-from tautscope.runs.recording import Recording, per_dof
-
-Floats = NDArray[np.float64]
+from tautscope.runs.recording import Floats, Recording, per_dof
 
 FIRST_SEED = 40
 """Seed of the motion on the twin of seed 0."""
@@ -31,30 +29,53 @@ class OperatorResult:
 
     The tip is the true one, or where it is not known, on hardware, the estimate at the times of the
     images or measurements that measured the DOF. NaN without an uncompensated run; overspeed and
-    creep also without the true tip, because they would measure the sensor's noise.
-
-    Attributes:
-        uncompensated_rms: RMS of (tip - reference) without compensation.
-        compensated_rms: RMS of (tip - reference) with compensation.
-        reduction: 1 - compensated_rms / uncompensated_rms.
-        largest: Largest |tip - reference| with compensation.
-        overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
-        creep: Travel of the true tip while every reference rests, with compensation.
-        bound: The reduction of the vector law with exact knowledge on ideal plays of the article's
-            uncompensated widths (`tautscope.report.tracking_bound`); NaN for another robot.
-        slack: Width of the slack found, delta_plus - delta_minus at the end.
+    creep also without the true tip, because they would measure the sensor's noise. The bound is
+    that of `tautscope.report.tracking_bound`, NaN for another robot.
     """
 
-    uncompensated_rms: float
-    compensated_rms: float
-    reduction: float
-    largest: float
-    overspeed: float
-    creep: float
-    bound: float
-    slack: float
+    uncompensated_rms: float = figure(
+        "uncompensated tracking error, RMS",
+        "Distance of the tip from the reference without compensation.",
+    )
+    compensated_rms: float = figure(
+        "compensated tracking error, RMS",
+        "Distance of the tip from the reference with compensation.",
+    )
+    reduction: float = figure(
+        "reduction",
+        "Share of the tracking error that compensation removes.",
+        "share",
+        "min",
+        (0.85, 0.78, 0.80),
+    )
+    largest: float = figure(
+        "largest error",
+        "Largest distance of the tip from the reference with compensation.",
+        goal=(2e-3, 0.5, 0.25),
+    )
+    overspeed: float = figure(
+        "tip overspeed",
+        "Largest speed of the tip over that of the reference (99.9th percentile).",
+        "number",
+        goal=2.0,
+    )
+    creep: float = figure(
+        "creep",
+        "Travel of the tip while the operator rests: it should stand still.",
+        goal=(0.5e-3, 0.05, 0.01),
+    )
+    bound: float = figure(
+        "bound of the reduction",
+        "Reduction of a law that knows tip and slack exactly: no goal, but what could be reached.",
+        "share",
+        "min",
+    )
+    slack: float = figure(
+        "slack found", "Width of the slack that the loop has found by the end of the run."
+    )
 
 
+OPERATOR_ROWS = rows_of(OperatorResult)
 OperatorResults = dict[NamedDof, OperatorResult]
 
 

@@ -1,21 +1,35 @@
-"""Figures of merit, tables and figure of a recorded run."""
+"""Figures of merit, tables, figures and report of a recorded run."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tautscope._core import __version__
+from tautscope.report import tables
 from tautscope.report.operator_motion import (
     OperatorResults,
     evaluate_operator_motion,
     evaluate_uncompensated_motion,
 )
-from tautscope.report.report import CaptionedFigure, recorded_motion_section, table1_section
+from tautscope.report.report import (
+    FIGURE5_CAPTION,
+    figure_list,
+    page,
+    recorded_motion_section,
+    table1_section,
+    warning_list,
+)
 from tautscope.report.results import Results, evaluate, evaluate_uncompensated
-from tautscope.report.tables import finite_or_none, operator_to_json
+from tautscope.report.tables import finite, operator_to_json
 from tautscope.runs.recording import Recording, per_dof
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -27,10 +41,12 @@ class RecordedRun:
     Attributes:
         main: The run, with compensation or without.
         uncompensated: One without, if `main` has compensation and there is one.
+        source: File or folder that `main` was read from, if any.
     """
 
     main: Recording
     uncompensated: Recording | None = None
+    source: Path | None = None
 
     @property
     def is_experiment(self) -> bool:
@@ -76,12 +92,14 @@ class RecordedRun:
         In m or rad; None if unknown.
         """
         return {
-            dof.label: {
-                "uncompensated": finite_or_none(found.uncompensated_estimate),
-                "compensated": finite_or_none(found.compensated_estimate),
-                "reduction": finite_or_none(found.reduction_estimate),
-                "tracking_rms": finite_or_none(found.tracking_estimate),
-            }
+            dof.label: finite(
+                {
+                    "uncompensated": found.uncompensated_estimate,
+                    "compensated": found.compensated_estimate,
+                    "reduction": found.reduction_estimate,
+                    "tracking_rms": found.tracking_estimate,
+                }
+            )
             for dof, found in self.results.items()
         } | operator_to_json(self.operator_results)
 
@@ -97,27 +115,66 @@ class RecordedRun:
             "warnings": list(self.main.warnings),
         }
 
+    def write_report(
+        self,
+        place: Path,
+        facts: Mapping[str, str],
+        further: Iterable[tuple[str, Figure, str]] = (),
+    ) -> None:
+        """Write report.html, its figures, and table1.csv of the experiment, to an existing folder.
+
+        Args:
+            place: The folder.
+            facts: Further facts of the run.
+            further: Files and captions of further figures.
+        """
+        # Matplotlib takes half a second to import.
+        from tautscope.figure_style import style  # noqa: PLC0415
+        from tautscope.report.figures import figure5  # noqa: PLC0415
+
+        config, pictures = self.main.config, [self.figure(), *further]
+        if self.main.snapshot is not None:
+            drawn = figure5(self.main.snapshot, config)
+            pictures.append(("fig5.png", drawn, FIGURE5_CAPTION))
+        if results := self.results:
+            tables.write_csv(place / "table1.csv", [config.twin.seed], {config.profile: [results]})
+        with style():
+            for name, figure, _ in pictures:
+                figure.savefig(place / name)
+            text = page(
+                "on the rig named below",
+                f"""{self.section()}
+{warning_list(self.main.warnings)}
+<h2>Figures</h2>
+{figure_list(each[1:] for each in pictures)}""",
+                {"tautscope": __version__, **facts},
+                config,
+            )
+        (place / "report.html").write_text(text, encoding="utf-8")
+
     def section(self) -> str:
         """The tables as HTML."""
         if self.is_experiment:
             return table1_section(self.results, is_tip_known=self.is_tip_known)
         return recorded_motion_section(self.operator_results, self.tip)
 
-    def figure(self) -> tuple[str, CaptionedFigure]:
-        """The figure and the name of its file."""
+    def figure(self) -> tuple[str, Figure, str]:
+        """Name of its file, figure and caption."""
         # Matplotlib takes half a second to import.
         from tautscope.report.figures import figure9  # noqa: PLC0415
         from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
         if self.is_experiment:
-            return "fig9.png", CaptionedFigure(
+            return (
+                "fig9.png",
                 figure9(self.uncompensated, self.main),
                 "Fig. 9. First row: reference, command, estimate and both "
                 "contact offsets. Second row: loops of the estimate, and of the true tip where it "
                 "is known; a narrow loop on the dashed line, an ideal tip, is the goal. The first "
                 "period, in which the slack is estimated, is thin.",
             )
-        return "tracking.png", CaptionedFigure(
+        return (
+            "tracking.png",
             draw_operator_motion(self.uncompensated, self.main),
             f"The motion, figures {self.tip}. Left: reference, command and tip, in a part of the "
             "run. Right: tracking error over the whole run.",

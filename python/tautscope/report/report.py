@@ -5,18 +5,16 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from tautscope._core import __version__
 from tautscope.config import Config, dump_config
 from tautscope.dof import Dof, NamedDof
 from tautscope.report import tables
-from tautscope.report.operator_motion import OperatorResults
-from tautscope.report.results import Figures, Results
-from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
+from tautscope.report.operator_motion import OPERATOR_ROWS, OperatorResults
+from tautscope.report.results import ROWS, Figures, Results, combine
+from tautscope.report.rows import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,41 +58,6 @@ _IMAGES = "the endoscope\u2019s images"
 _UNKNOWN_TIP = ": the true state of the tip is not known on hardware"
 
 
-@dataclass(frozen=True)
-class CaptionedFigure:
-    """A figure and its caption."""
-
-    figure: Figure
-    caption: str
-
-
-def run_report(
-    config: Config,
-    facts: dict[str, str],
-    section: str,
-    figures: Sequence[CaptionedFigure],
-    warnings: Sequence[str],
-) -> str:
-    """The page of ``tautscope run`` and ``tautscope report``: one or two recorded runs.
-
-    Args:
-        config: Configuration of the run.
-        facts: Further facts of the run.
-        section: Of the figures of merit: `table1_section` or `recorded_motion_section`.
-        figures: Figures of the run.
-        warnings: Warnings of the run.
-    """
-    return page(
-        "on the rig named below",
-        f"""{section}
-{warning_list(warnings)}
-<h2>Figures</h2>
-{figure_list(figures)}""",
-        {"tautscope": __version__, **facts},
-        config,
-    )
-
-
 def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
     """Table 1 of a recorded run."""
     start = (
@@ -103,17 +66,18 @@ def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
         else f"Figures are by camera{_UNKNOWN_TIP}. The tracking error includes the first period, "
         "in which the contact offsets are estimated."
     )
+    rows = measured_rows(results, ROWS)
     return f"""<h2>Table 1</h2>
-<div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
+<div class="wide">{figures_table({"rig": [results]}, rows, "by camera")}</div>
 <p class="note">{start} The article&rsquo;s figures are of its own rig.</p>
-{row_explanations(measured_rows([results], ROWS))}"""
+{row_explanations(rows)}"""
 
 
 def recorded_motion_section(results: OperatorResults, tip: str) -> str:
     """The tracking of a recorded motion, with the words for whose tip it is."""
-    rows = measured_rows([results], OPERATOR_ROWS)
+    rows = measured_rows(results, OPERATOR_ROWS)
     return f"""<h2>Recorded motion</h2>
-<div class="wide">{operator_table([results], rows)}</div>
+<div class="wide">{figures_table({"": [results]}, rows)}</div>
 <p class="note">Figures are {tip}{"" if tip == "of the true tip" else _UNKNOWN_TIP}.
 The first 40&nbsp;s, or half of a shorter run, do not count: there the contact offsets are
 estimated.</p>
@@ -148,9 +112,14 @@ def document(title: str, lead: str, body: str) -> str:
 """
 
 
-def figure_list(figures: Sequence[CaptionedFigure]) -> str:
+def figure_list(figures: Iterable[tuple[Figure, str]]) -> str:
     """The figures with their captions, one below the other."""
-    return "".join(_figure(each) for each in figures)
+    parts = []
+    for figure, caption in figures:
+        data = io.BytesIO()
+        figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
+        parts.append(embedded(data.getvalue(), "jpeg", caption))
+    return "".join(parts)
 
 
 def warning_list(warnings: Sequence[str]) -> str:
@@ -159,37 +128,44 @@ def warning_list(warnings: Sequence[str]) -> str:
     return f'<h2>Warnings</h2><ul class="note">{items}</ul>'
 
 
-def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = False) -> str:
-    """Table 1: per DOF the article, then each column with a result per seed; the last in bold.
+def figures_table(
+    columns: Mapping[str, Sequence[dict[NamedDof, Figures]]],
+    rows: Sequence[Row],
+    article: Literal["true tip", "by camera"] | None = None,
+) -> str:
+    """A table of figures: per DOF each column's median over the seeds, and the worst.
 
     Args:
-        columns: Results per seed, by the column's title.
-        by_camera: Compare the article with the figures measured by the camera, and leave out rows
-            without a value.
+        columns: Figures per seed, by the column's title.
+        rows: The rows.
+        article: Whether the article's figures, which are by camera, are in a column of their own,
+            and beside the figures of what; then the last column is bold.
     """
-    sources = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
-    *_, (last, dofs, _) = sources
-    span = 1 + len(columns)
-    heads = "".join(f'<th colspan="{span}">{tables.heading(dof)}</th>' for dof in dofs)
-    names = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    names = f'<th class="first">article</th>{names}' * len(dofs)
+    sources = [(combine(of, "median"), combine(of, "worst"), len(of)) for of in columns.values()]
+    dofs = list(sources[0][0])
+    span = f' colspan="{1 + len(columns)}"' if article else ""
+    heads = "".join(f"<th{span}>{tables.heading(dof)}</th>" for dof in dofs)
+    head = f"<tr><th></th>{heads}</tr>"
+    if article:
+        names = "".join(f"<th>{escape(name)}</th>" for name in columns)
+        names = f'<th class="first">article</th>{names}' * len(dofs)
+        head += f"<tr><th></th>{names}</tr>"
     lines = []
-    for row in measured_rows(last, ROWS) if by_camera else ROWS:
+    for row in rows:
         cells = []
         for dof in dofs:
-            article = tables.article_cell(row, dof, by_camera)
-            cells.append(f'<td class="first">{article}</td>')
-            for results, middle, bad in sources:
-                value = tables.cell(row, dof, getattr(middle[dof], row.name))
-                worst = tables.cell(row, dof, getattr(bad[dof], row.name))
-                note = f"<small>({worst})</small>" if len(results) > 1 else ""
-                mark = ' class="ours"' if results is last else ""
+            if article:
+                figure = tables.article_cell(row, dof, article == "by camera")
+                cells.append(f'<td class="first">{figure}</td>')
+            for source in sources:
+                value, worst = (
+                    tables.cell(row, dof, getattr(each[dof], row.name)) for each in source[:2]
+                )
+                note = f"<small>({worst})</small>" if source[2] > 1 else ""
+                mark = ' class="ours"' if article and source is sources[-1] else ""
                 cells.append(f"<td{mark}>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
-    return (
-        f'<table class="figures"><thead><tr><th></th>{heads}</tr><tr><th></th>{names}</tr></thead>'
-        f"<tbody>{''.join(lines)}</tbody></table>"
-    )
+    return f'<table class="figures"><thead>{head}</thead><tbody>{"".join(lines)}</tbody></table>'
 
 
 def row_explanations(
@@ -205,7 +181,7 @@ def row_explanations(
         results: Results per seed, of which the median counts; none for another profile or rig.
         has_goals: Whether to show the goals, which are those of the article's instrument.
     """
-    middle: dict[NamedDof, Figures] = tables.median(results) if results else {}
+    middle: dict[NamedDof, Figures] = combine(results, "median") if results else {}
     lines = []
     for row in rows:
         values = {dof: getattr(each, row.name) for dof, each in middle.items()}
@@ -234,16 +210,16 @@ def row_explanations(
     )
 
 
-def measured_rows(results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row]) -> list[Row]:
+def measured_rows(results: Mapping[NamedDof, Figures], rows: Sequence[Row]) -> list[Row]:
     """The rows with a value for a DOF."""
-    dofs = tables.median(results).values()
-    return [row for row in rows if not all(math.isnan(getattr(each, row.name)) for each in dofs)]
+    figures = results.values()
+    return [row for row in rows if not all(math.isnan(getattr(each, row.name)) for each in figures)]
 
 
 def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
     """The section of the operator motion of ``tautscope demo``."""
     return f"""<h2>Operator motion</h2>
-<div class="wide">{operator_table(results, OPERATOR_ROWS)}</div>
+<div class="wide">{figures_table({"": results}, OPERATOR_ROWS)}</div>
 <p class="note">Profile &ldquo;{profile}&rdquo;. All degrees of freedom make minimum-jerk moves
 between random targets at the same time, with rests; the first 40&nbsp;s do not count. Errors are of
 the true tip, and their mean is not removed. Creep is the travel of the tip while every reference
@@ -252,34 +228,8 @@ article.</p>
 {row_explanations(OPERATOR_ROWS, results if profile == "best" else ())}"""
 
 
-def operator_table(results: Sequence[OperatorResults], rows: Sequence[Row]) -> str:
-    """A table of an operator motion: per figure the median over the seeds, and the worst."""
-    middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
-    heads = "".join(f"<th>{tables.heading(dof)}</th>" for dof in middle)
-    lines = []
-    for row in rows:
-        cells = []
-        for dof in middle:
-            value, worst = (
-                tables.cell(row, dof, getattr(each[dof], row.name)) for each in (middle, bad)
-            )
-            note = f"<small>({worst})</small>" if len(results) > 1 else ""
-            cells.append(f"<td>{value}{note}</td>")
-        lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
-    return (
-        f'<table class="figures"><thead><tr><th></th>{heads}</tr></thead>'
-        f"<tbody>{''.join(lines)}</tbody></table>"
-    )
-
-
-def _figure(captioned: CaptionedFigure) -> str:
-    data = io.BytesIO()
-    captioned.figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
-    return embedded(data.getvalue(), "jpeg", captioned.caption)
-
-
 def embedded(data: bytes, kind: str, caption: str) -> str:
-    """A figure of an encoded image, ``jpeg`` or ``gif``, in the page itself."""
+    """A figure of an encoded image, ``jpeg``, ``png`` or ``gif``, in the page itself."""
     code, text = base64.b64encode(data).decode(), escape(caption)
     return (
         f'<figure><img alt="{text}" src="data:image/{kind};base64,{code}">'

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tautscope.dof import NamedDof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
+from tautscope.report.rows import figure, rows_of
 from tautscope.runs.recording import Recording, Table, per_feature
 
 if TYPE_CHECKING:
@@ -30,49 +31,106 @@ class DofResult:
 
     Widths are of y over x in the last two periods of the DOF's segment: x is the command without
     and the reference with compensation; y is the true tip, or the estimate where the name says so
-    ("by camera"). NaN if the true tip is not known, or without an uncompensated run.
-
-    Attributes:
-        uncompensated: Mean width without compensation.
-        uncompensated_max: Largest width without compensation.
-        compensated: Mean width with compensation.
-        compensated_max: Largest width with compensation.
-        reduction: 1 - compensated / uncompensated, of the mean widths.
-        reduction_max: 1 - compensated_max / uncompensated_max.
-        uncompensated_estimate: Mean width without compensation, by camera.
-        compensated_estimate: Mean width with compensation, by camera.
-        reduction_estimate: Reduction by camera; this is the article's.
-        start_periods: Periods until the compensated mean width stays within 1.2 times its last.
-        tracking_rms: RMS of (true tip - reference) after the start, with compensation.
-        tracking_estimate: RMS of (estimate - reference) after the start, by camera; over the whole
-            segment if the true tip, and so the start, is not known.
-        state_rms: RMS of (state_estimate - true_state at the capture time) over all frames of the
-            whole compensated run that measured this DOF.
-        marker_rms_px: RMS distance of measured from true features in the DOF's segment [px].
-        frames_used: Share of the segment's frames that measured this DOF.
-        tip_overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
-        actuator_gain: Largest |change of command| over |change of reference|.
+    ("by camera"). NaN if the true tip is not known, or without an uncompensated run. Tracking
+    errors begin after the start, by camera with the segment where the true tip is not known; marker
+    error, frames used and speeds are of the segment, the state error of the whole run.
     """
 
-    uncompensated: float
-    uncompensated_max: float
-    compensated: float
-    compensated_max: float
-    reduction: float
-    reduction_max: float
-    uncompensated_estimate: float
-    compensated_estimate: float
-    reduction_estimate: float
-    start_periods: float
-    tracking_rms: float
-    tracking_estimate: float
-    state_rms: float
-    marker_rms_px: float
-    frames_used: float
-    tip_overspeed: float
-    actuator_gain: float
+    uncompensated: float = figure(
+        "uncompensated width",
+        "Slack: how far the command moves after a reversal before the tip does. Mean width of the "
+        "loop of the tip over the command, without compensation.",
+        in_summary=True,
+    )
+    uncompensated_max: float = figure(
+        "uncompensated width, largest", "The same loop where it is widest."
+    )
+    compensated: float = figure(
+        "compensated width",
+        "What is left of the slack for the operator: mean width of the loop of the tip over the "
+        "reference, with compensation. 0 is ideal; a negative width means that the tip leads.",
+        in_summary=True,
+    )
+    compensated_max: float = figure("compensated width, largest", "This loop where it is widest.")
+    reduction: float = figure(
+        "reduction",
+        "Share of the mean width that compensation removes: 1 - compensated / uncompensated.",
+        "share",
+        "min",
+        0.95,
+        in_summary=True,
+    )
+    reduction_max: float = figure(
+        "reduction of the largest width",
+        "The same share of the largest widths.",
+        "share",
+        "min",
+        0.90,
+        in_summary=True,
+    )
+    uncompensated_estimate: float = figure(
+        "uncompensated width, by camera",
+        "The uncompensated width with the tip as the camera measures it, like the article's.",
+    )
+    compensated_estimate: float = figure(
+        "compensated width, by camera",
+        "The compensated width with the tip as the camera measures it.",
+    )
+    reduction_estimate: float = figure(
+        "reduction, by camera", "The reduction of the two widths by camera.", "share", "min"
+    )
+    start_periods: float = figure(
+        "periods until settled",
+        "Periods of the sine until the compensated width stays within 1.2 times its last value: "
+        "how long the slack takes to be estimated.",
+        "count",
+        goal=1.0,
+        in_summary=True,
+    )
+    tracking_rms: float = figure(
+        "tracking error, RMS",
+        "Distance of the tip from the reference, once settled.",
+        in_summary=True,
+    )
+    tracking_estimate: float = figure(
+        "tracking error, RMS, by camera",
+        "The tracking error with the tip as the camera measures it.",
+    )
+    state_rms: float = figure(
+        "state error, RMS",
+        "Error of the loop's estimate of the tip at the time of each image.",
+        in_summary=True,
+    )
+    marker_rms_px: float = figure(
+        "marker error, RMS [px]",
+        "Distance of a band's measured position in the image from its true one.",
+        "number",
+        in_summary=True,
+    )
+    frames_used: float = figure(
+        "frames used",
+        "Share of the images that determined this degree of freedom. A straight instrument does "
+        "not show its rotation.",
+        "share",
+        "min",
+    )
+    tip_overspeed: float = figure(
+        "tip overspeed",
+        "Largest speed of the tip over that of the reference (99.9th percentile). A tip that jumps "
+        "has a large value; 1 is ideal.",
+        "number",
+        goal=2.0,
+    )
+    actuator_gain: float = figure(
+        "actuator gain",
+        "Largest step of the command over that of the reference: how hard the motor works while it "
+        "crosses the slack.",
+        "number",
+        goal=5.0,
+    )
 
 
+ROWS = rows_of(DofResult)
 Results = dict[NamedDof, DofResult]
 
 
@@ -89,44 +147,26 @@ def evaluate_uncompensated(recording: Recording) -> Results:
 
     Those of compensation are NaN.
     """
-    unknown = {
-        field.name: np.nan
-        for field in fields(DofResult)
-        if field.name.startswith(("compensated", "reduction", "start"))
-    }
+    names = [row.name for row in ROWS if row.name.startswith(("compensated", "reduction", "start"))]
+    unknown = dict.fromkeys(names, np.nan)
     found = evaluate(recording, recording)
     return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
 def combine(
-    results: Sequence[dict[NamedDof, Figures]], how: dict[str, str] | str
+    results: Sequence[dict[NamedDof, Figures]], how: Literal["median", "worst"]
 ) -> dict[NamedDof, Figures]:
-    """Combine seeds: ``"median"``, or per name of a figure ``"min"``, ``"max"`` or ``"median"``.
-
-    Seeds with an unknown figure are skipped.
-    """
-    return {
-        dof: replace(
-            figures,
-            **{
-                field.name: _combined(
-                    [getattr(result[dof], field.name) for result in results],
-                    how if isinstance(how, str) else how[field.name],
-                )
-                for field in fields(figures)
-            },
-        )
-        for dof, figures in results[0].items()
-    }
-
-
-def _combined(values: list[float], how: str) -> float:
-    known = [value for value in values if not np.isnan(value)]
-    if not known:
-        return np.nan
-    if how == "median":
-        return float(np.median(known))
-    return max(known) if how == "max" else min(known)
+    """Median or worst value of every figure over seeds; unknown ones are skipped."""
+    combined = {}
+    for dof, figures in results[0].items():
+        values = {}
+        for row in rows_of(type(figures)):
+            found = [getattr(result[dof], row.name) for result in results]
+            known = [value for value in found if not np.isnan(value)]
+            function = np.median if how == "median" else max if row.worst == "max" else min
+            values[row.name] = float(function(known)) if known else np.nan
+        combined[dof] = replace(figures, **values)
+    return combined
 
 
 def true_loop(

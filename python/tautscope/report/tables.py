@@ -4,26 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from tautscope.dof import Dof, NamedDof
-from tautscope.report.results import DofResult, Figures, Results, combine
-from tautscope.report.rows import ARTICLE, ROWS, Row
-
-
-def median(results: Sequence[dict[NamedDof, Figures]]) -> dict[NamedDof, Figures]:
-    """Median of every figure over the seeds."""
-    return combine(results, "median")
-
-
-def worst(
-    results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row] = ROWS
-) -> dict[NamedDof, Figures]:
-    """Worst value of every figure over the seeds."""
-    return combine(results, {row.name: row.worst for row in rows})
+from tautscope.report.results import ROWS, DofResult, Figures, combine
+from tautscope.report.rows import ARTICLE, Row, rows_of
 
 
 def in_display_unit(row: Row, dof: NamedDof, value: float) -> float:
@@ -84,22 +72,27 @@ def write_csv(
     path: Path,
     seeds: Sequence[int],
     by_profile: Mapping[str, Sequence[dict[NamedDof, Figures]]],
-    rows: Sequence[Row] = ROWS,
 ) -> None:
     """Write figures in display units: per DOF the article's, per profile seeds, median, worst.
 
-    Of an operator motion, `OPERATOR_ROWS`, the article has none.
+    Of an operator motion the article has none.
     """
     lines = [
         (profile, source, found)
         for profile, results in by_profile.items()
-        for source, found in _sources(seeds, results, rows)
+        for source, found in [
+            *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
+            ("median", combine(results, "median")),
+            ("worst", combine(results, "worst")),
+        ]
     ]
+    first = lines[0][2]
+    rows = rows_of(type(next(iter(first.values()))))
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in rows)])
-        for dof in lines[0][2]:
-            if rows is ROWS:
+        for dof in first:
+            if rows == ROWS:
                 article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in rows]
                 writer.writerow([dof.label, dof.display_unit, "", "article", *article])
             for profile, source, result in lines:
@@ -107,71 +100,34 @@ def write_csv(
                 writer.writerow([dof.label, dof.display_unit, profile, source, *values])
 
 
-def _sources(
-    seeds: Sequence[int], results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row]
-) -> list[tuple[str, dict[NamedDof, Figures]]]:
-    """The figures of every seed, their median and the worst, each with its name."""
-    return [
-        *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
-        ("median", median(results)),
-        ("worst", worst(results, rows)),
-    ]
-
-
-def to_json(
-    profile: str,
-    seeds: Sequence[int],
-    results: Sequence[Results],
-    operator_results: Sequence[dict[NamedDof, Figures]],
-    *,
-    sim_seconds: float,
-    wall_seconds: float,
-    article_results: Sequence[Results] = (),
-) -> dict[str, Any]:
-    """The output of ``tautscope demo --json``; an unknown figure is None.
-
-    Medians over the seeds, and under ``worst`` the worst values; insertion in mm. Under ``paper``
-    the results of the article's scheme, if it was run beside another one. Under ``hand`` the
-    medians of the operator motion's figures, in m and rad.
-    """
-    return {
-        "profile": profile,
-        "seeds": list(seeds),
-        "dof": _by_dof(results),
-        **({"paper": _by_dof(article_results)} if article_results else {}),
-        "hand": operator_to_json(median(operator_results)),
-        "sim_seconds": sim_seconds,
-        "wall_seconds": wall_seconds,
-    }
-
-
 def operator_to_json(results: Mapping[NamedDof, Figures]) -> dict[str, dict[str, float | None]]:
     """Figures of an operator motion by DOF [m or rad]; an unknown figure is None."""
-    return {
-        dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
-        for dof, figures in results.items()
-    }
+    return {dof.label: finite(asdict(figures)) for dof, figures in results.items()}
 
 
-def _by_dof(results: Sequence[Results]) -> dict[str, Any]:
-    middle, bad = median(results), worst(results)
+def summary(results: Sequence[dict[NamedDof, DofResult]]) -> dict[str, Any]:
+    """Median figures of the seeds by DOF in display units, and under ``worst`` the worst ones."""
+    middle, bad = combine(results, "median"), combine(results, "worst")
     return {
         dof.label: {
             "unit": dof.display_unit,
-            **_summary(dof, middle[dof]),
-            "worst": _summary(dof, bad[dof]),
+            **dict(_summary(dof, middle[dof])),
+            "worst": dict(_summary(dof, bad[dof])),
         }
-        for dof in results[0]
+        for dof in middle
     }
 
 
-def _summary(dof: NamedDof, result: DofResult) -> dict[str, float | None]:
-    values = asdict(result)
-    return {
-        row.name: finite_or_none(in_display_unit(row, dof, values[row.name]))
-        for row in ROWS
-        if row.in_summary
-    }
+def _summary(dof: NamedDof, result: DofResult) -> Iterator[tuple[str, float | None]]:
+    for row in ROWS:
+        if row.in_summary:
+            value = in_display_unit(row, dof, getattr(result, row.name))
+            yield row.name, finite_or_none(value)
+
+
+def finite(figures: Mapping[str, float]) -> dict[str, float | None]:
+    """Figures by name, None for those that are not finite."""
+    return {name: finite_or_none(value) for name, value in figures.items()}
 
 
 def finite_or_none(value: float) -> float | None:

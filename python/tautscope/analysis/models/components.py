@@ -102,7 +102,6 @@ def adaptive_operator(signals: Signals) -> Component:
         np.column_stack([plain, *bent]),
         signals.travel,
         signals.measured,
-        signals.at,
         spread=SPREAD,
         walks=WALKS,
     )
@@ -149,8 +148,7 @@ def _refitted(
         tracked = track(
             (output - output[:begin].mean())[:, None],
             signals.travel[:end],
-            measured,
-            at[at < end],
+            measured[:end],
             spread=REFIT_SPREAD,
             walks=REFIT_WALKS,
         )

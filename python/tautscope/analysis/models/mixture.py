@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from tautscope.analysis.models import last_tip, linear_fit, online
+from tautscope.analysis.models import last_tip, online
 from tautscope.analysis.models.components import (
     Component,
     Signals,
     adaptive_operator,
     refitted_models,
 )
-from tautscope.analysis.models.task import Floats, Prediction, Task
+from tautscope.analysis.models.task import Floats, Prediction, Task, fit_line
 
 MEMORIES = (0.8, 0.9, 0.95, 0.98, 0.995)
 """Discounts of past squared errors, per measured tip: memories of 5 to 200 tips."""
@@ -29,7 +29,7 @@ FLOOR = 1e-3
 def run(task: Task) -> Prediction:
     """Predict the second half by the mixture; the traces are the weights of its components."""
     command, measured = task.first_half
-    slope = linear_fit.fit(command, measured, task.gain).gain
+    slope, _ = fit_line(command, measured, task.gain)
     with_tip = measured[np.isfinite(measured)]
     span, unit = float(np.ptp(command)), float(np.ptp(with_tip)) * (-1 if slope < 0 else 1)
     middle, zero = float(command.min() + command.max()) / 2, float(with_tip.mean())

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from tautscope._core import Estimator, TipFilter
 from tautscope.analysis.models import constant_play
-from tautscope.analysis.models.task import Floats, Prediction, Task, shared
+from tautscope.analysis.models.task import Floats, Prediction, Task
 from tautscope.config import Config
 from tautscope.loop.construction import core_settings
 
 UPDATE_SHARE = 0.01
 """Default update distance, as a share of the command's range in the first half."""
-
+TASKS = 8
+"""Tasks whose results several models share: a record, and the same with sights only."""
 
 EXPECTED_WIDTH, TIP_STD = 48.0, 0.1
 """Width that the filter expects, about half of the command's range, and standard deviation of a
@@ -61,7 +63,7 @@ class InputScale:
     used: int
 
 
-@shared
+@lru_cache(maxsize=TASKS)
 def input_scale(task: Task) -> InputScale:
     """Gain and offset for an on-line estimator.
 
@@ -93,7 +95,7 @@ def predict(task: Task, make: Make) -> Prediction:
     return Prediction(tip, parameters, {"delta_minus": minus, "delta_plus": plus})
 
 
-@shared
+@lru_cache(maxsize=TASKS)
 def run_estimator(task: Task, make: Make) -> tuple[InputScale, Floats, Floats, Floats]:
     """Scale of the input, and (n,) each: tip, delta_minus and delta_plus.
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +12,6 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 
 Floats = NDArray[np.float64]
-P = ParamSpec("P")
-T = TypeVar("T")
 
 SWEEP = 0.9
 """Share of its range that the command must have swept before a fit begins."""
@@ -31,7 +28,6 @@ class Task:
         gain: Tip travel per command travel in contact, if known.
         update_distance: tau of Eqs. (4)-(6) in the tip's unit, if given.
         config: Its insertion has the settings of the on-line estimators.
-        results: What several models compute, by function and arguments; see `shared`.
     """
 
     command: Floats
@@ -40,7 +36,6 @@ class Task:
     gain: float | None
     update_distance: float | None
     config: Config
-    results: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def first_half(self) -> tuple[Floats, Floats]:
@@ -61,20 +56,6 @@ class Prediction:
     tip: Floats
     parameters: Mapping[str, Any]
     traces: Mapping[str, Floats] = field(default_factory=dict)
-
-
-def shared(function: Callable[Concatenate[Task, P], T]) -> Callable[Concatenate[Task, P], T]:
-    """Decorator of a function of a task and hashable arguments: several models share its result."""
-
-    @wraps(function)
-    def stored(task: Task, /, *args: P.args, **kwargs: P.kwargs) -> T:
-        key = function, args, tuple(kwargs.items())
-        if key not in task.results:
-            task.results[key] = function(task, *args, **kwargs)
-        found: T = task.results[key]
-        return found
-
-    return stored
 
 
 def last_seen(measured: Floats) -> NDArray[np.intp]:
@@ -132,8 +113,10 @@ def fit_samples(command: Floats, measured: Floats) -> NDArray[np.bool_]:
 def fit_line(x: Floats, y: Floats, gain: float | None = None) -> tuple[float, float]:
     """Gain and offset of y = gain x + offset by least squares; only the offset if gain is given.
 
-    Without movement in x the gain is 0.
+    Without movement in x the gain is 0; samples without y (NaN) are left out.
     """
+    known = np.isfinite(y)
+    x, y = x[known], y[known]
     mean_x, mean_y = float(x.mean()), float(y.mean())
     if gain is None:
         centred = x - mean_x

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope._core import track_coefficients
 from tautscope.analysis.models.task import Floats
@@ -15,13 +14,7 @@ UNKNOWN = 10.0
 
 
 def track(
-    features: Floats,
-    travel: Floats,
-    tips: Floats,
-    at: NDArray[np.intp],
-    *,
-    spread: float,
-    walks: Floats,
+    features: Floats, travel: Floats, tips: Floats, *, spread: float, walks: Floats
 ) -> Floats:
     """Predict the tip by filters that differ in their process noise.
 
@@ -33,8 +26,7 @@ def track(
     Args:
         features: (n, m).
         travel: (n,) travel of the command since the start.
-        tips: (n,) the tip; read only at the samples `at`.
-        at: (s,) samples with a measured tip.
+        tips: (n,) the tip, NaN where it was not measured.
         spread: Prior standard deviation of each coefficient; the prior mean of the first is 1, that
             of the others 0.
         walks: (k, 2) standard deviation after a travel of 1 of disturbance and coefficients, the
@@ -44,13 +36,11 @@ def track(
         (n, k) predicted tip; NaN up to the first measured tip. Sample j uses the tips before j.
     """
     samples, size = features.shape
-    seen = np.full(samples, np.nan)
-    seen[at] = tips[at]
     coefficients = (walks[:, 1:] * spread) ** 2
     return track_coefficients(
         np.column_stack([features, np.ones(samples)]),
         travel,
-        seen,
+        tips,
         mean=np.arange(size + 1) == 0,
         variance=np.append(np.full(size, spread**2), UNKNOWN**2),
         growth=np.column_stack([np.repeat(coefficients, size, axis=1), walks[:, :1] ** 2]),

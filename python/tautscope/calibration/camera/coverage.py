@@ -9,10 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.camera.board import LARGEST_SATURATED_SHARE, SATURATED, Board, View
+from tautscope.calibration.camera.board import (
+    LARGEST_SATURATED_SHARE,
+    SATURATED,
+    Board,
+    Image,
+    View,
+)
 from tautscope.errors import CalibrationError
-
-Image = NDArray[np.uint8]
 
 COLUMNS, ROWS = 4, 3
 """Cells of the image."""

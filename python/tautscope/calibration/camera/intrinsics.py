@@ -8,12 +8,11 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.calibration.camera.board import View
 from tautscope.errors import CalibrationError
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 Model = Literal["pinhole", "fisheye"]
 
 OUTLIER = 3.0

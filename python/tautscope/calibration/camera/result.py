@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from tautscope.calibration.camera.coverage import COLUMNS, ROWS, Coverage
 from tautscope.calibration.camera.intrinsics import CameraFit, Intrinsics
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
 from tautscope.figure_style import BLUE
-
-Floats = NDArray[np.float64]
+from tautscope.loop.kinematics import Floats
 
 WIDEST = np.radians(75.0)
 """Angle from the optical axis up to which a fisheye lens is converted: a pinhole has no 90 deg."""

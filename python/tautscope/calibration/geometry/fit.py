@@ -17,10 +17,10 @@ from tautscope.calibration.geometry.solver import Solution, solve
 from tautscope.calibration.geometry.values import Value, changes_and_stds, estimated_values
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector
 
-Floats = NDArray[np.float64]
 DETECTIONS = 2
 """How often the bands are searched again with the geometry found so far."""
 
@@ -40,7 +40,6 @@ class GeometryFit:
         warnings: What the user has to know; empty in the normal case.
         is_plausible: Whether the model explains the record; if not, do not use `config`.
         values: Estimated values, before and after.
-        found_share: Share of the images in which both bands were found at last.
         recording: The record, with the features of the last detection.
         states: (images, 3) most probable tip [m, rad, rad]; NaN without both bands.
         residuals: (images, 4) measured minus predicted features [px]; NaN likewise.
@@ -55,11 +54,15 @@ class GeometryFit:
     warnings: tuple[str, ...]
     is_plausible: bool
     values: tuple[Value, ...]
-    found_share: float
     recording: Recording
     states: Floats
     residuals: Floats
     expected: Floats
+
+    @property
+    def found_share(self) -> float:
+        """Share of the images in which both bands were found at last."""
+        return float(self.recording.found.mean())
 
 
 def fit(
@@ -161,7 +164,6 @@ def _result(
         warnings=(*doubts, *warnings),
         is_plausible=not doubts,
         values=values,
-        found_share=float(recording.found.mean()),
         recording=recording,
         states=per_image(solution.states[:, :3]),
         residuals=per_image(solution.residuals),

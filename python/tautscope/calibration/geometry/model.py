@@ -22,8 +22,8 @@ from tautscope.calibration.geometry.recording import Recording
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 FEATURE_STD = 0.5
 """Standard deviation of a feature, with what the model does not describe [px]."""
 TIP_STD = np.array([0.04, 0.08, 0.04])

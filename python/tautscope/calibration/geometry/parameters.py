@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 Intrinsics = Literal["none", "focal", "all"]
 INTRINSICS: tuple[Intrinsics, ...] = ("none", "focal", "all")
 """Which intrinsic parameters are estimated: none; one factor of both focal lengths; focal lengths,

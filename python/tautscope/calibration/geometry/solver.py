@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.model import FEATURE_STD, Model
 from tautscope.calibration.geometry.parameters import INDEX, RESULTS, SECTION_SHAPE_STD
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 TOLERANCE = 0.02
 """Largest last step of a parameter, in its standard deviations."""
 BLOCK = 2.0

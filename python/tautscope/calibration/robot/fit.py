@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -16,8 +15,7 @@ from tautscope.calibration.robot.model import PLAYS, Model
 from tautscope.calibration.robot.parameters import Parameter, fitted
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
-
-Floats = NDArray[np.float64]
+from tautscope.loop.kinematics import Floats
 
 LEAST = 100
 """Measurements that are needed."""

@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tautscope._core import Play
 from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, with_values
 from tautscope.config import Config
-from tautscope.loop.kinematics import STEP, build_kinematics, own_kinematics
+from tautscope.loop.kinematics import STEP, Floats, build_kinematics, own_kinematics
 from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, check_rotation
-
-Floats = NDArray[np.float64]
 
 PLAYS = 8
 """Parallel plays of a degree of freedom, with half widths from 0 to half of `width_limit`."""
