@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import serial
 from serial_settings import AXES, serial_config, serial_document
-from tautscope.bench.microcontroller import FaultKind, SimulatedMicrocontroller
+from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.cli import main
 from tautscope.config import DrivesConfig, dump_config, from_document
 from tautscope.dof import Dof
@@ -97,7 +97,7 @@ def test_motors_follow_in_si_units(tmp_path: Path) -> None:
     ],
 )
 def test_fault_while_running_stops_all_motors(
-    tmp_path: Path, kind: FaultKind, error: type[DriveError], node: str, message: str
+    tmp_path: Path, kind: str, error: type[DriveError], node: str, message: str
 ) -> None:
     config = serial_config(tmp_path, state_timeout=1.0)
     with running(config) as (board, drives):
