@@ -37,16 +37,15 @@ from tautscope.hardware.canopen_master import (
     open_bus,
 )
 from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.eds import load_eds
 from tautscope.hardware.fieldbus import (
     TX_PDO_OBJECTS,
     AbsentError,
-    Feedback,
+    Fieldbus,
     abort_error,
-    encoded,
     require_waived,
     target_object,
-    verify_setting,
 )
 from tautscope.hardware.object_dictionary import Entry
 
@@ -79,8 +78,8 @@ class _Sdo(SdoClient):
         self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
 
 
-class CanopenFieldbus:
-    """Drives on a CAN bus; a `tautscope.hardware.fieldbus.Fieldbus`.
+class CanopenFieldbus(Fieldbus):
+    """Drives on a CAN bus; a `Fieldbus`.
 
     Args:
         config: Bus, nodes, timeouts.
@@ -116,19 +115,6 @@ class CanopenFieldbus:
     def name(self, dof: Motor) -> str:
         """See `Fieldbus.name`."""
         return self._master.nodes[dof].name
-
-    def read(self, dof: Motor, entry: Entry) -> int:
-        """Read a value by SDO upload; see `Fieldbus.read`."""
-        data = self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
-        return entry.decode(data)
-
-    def write(self, dof: Motor, entry: Entry, value: int) -> None:
-        """Write a value by SDO download; see `Fieldbus.write`."""
-        known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
-        size = len(known) // 8 if known is not None and known.fixed_size else entry.size
-        data = encoded(self.name(dof), entry, value, size)
-        what = f"{entry} = {value}"
-        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
 
     def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure producer and consumer heartbeats and the PDOs, and read them back."""
@@ -202,6 +188,16 @@ class CanopenFieldbus:
             if sdo.tx_cobid == SDO_RESPONSE + node:
                 sdo.responses.put(data)
 
+    def _size(self, dof: Motor, entry: Entry) -> int:
+        known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
+        return len(known) // 8 if known is not None and known.fixed_size else entry.size
+
+    def _upload(self, dof: Motor, entry: Entry) -> bytes:
+        return self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
+
+    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
+        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
+
     def _request(self, dof: Motor, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
         node = self._master.nodes[dof]
         try:
@@ -220,7 +216,7 @@ class CanopenFieldbus:
 
     def _set(self, dof: Motor, entry: Entry, value: int) -> None:
         self.write(dof, entry, value)
-        verify_setting(self, dof, entry, value)
+        self.verify(dof, entry, value)
 
     def _set_or_waive(self, dof: Motor, entry: Entry, value: int) -> bool:
         """Set a value and read it back; False if that fails and is waived."""
