@@ -126,16 +126,13 @@ class CameraStream:
             try:
                 self._render(*self._captures.get(timeout=max(timeout, 0.0)))
             except queue.Empty:
-                self._capture_at_rest()
+                # The instrument at rest, while the motors are off.
+                now = time.monotonic()
+                if now >= self._due + self._period:
+                    self.capture(now, self._centreline_now())
             while self._pending and self._pending[0][0] <= time.monotonic():
                 _, at, image = self._pending.popleft()
                 self._send(at, image)
-
-    def _capture_at_rest(self) -> None:
-        """Capture the instrument at rest while the motors are off."""
-        now = time.monotonic()
-        if now >= self._due + self._period:
-            self.capture(now, self._centreline_now())
 
     def _render(self, at: float, centreline: Centreline) -> None:
         twin, faults = self._config.twin, self._faults

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -61,27 +62,26 @@ class Node:
     emergency: bytes = b""
 
 
-class CanopenMaster:
+class CanopenMaster(ABC):
     """Exchanges frames with drives and checks their heartbeats and emergency objects.
 
     Args:
         config: Node ids and timeouts.
         bus: An open CAN bus.
-        on_sdo_response: Called with node id and data of each SDO response.
     """
 
-    def __init__(
-        self, config: DrivesConfig, bus: can.BusABC, on_sdo_response: Callable[[int, bytes], None]
-    ) -> None:
+    def __init__(self, config: DrivesConfig, bus: can.BusABC) -> None:
         self._config = config
         self._bus = bus
-        self._on_sdo_response = on_sdo_response
         self.nodes = {
             dof: Node(f"{dof.label}, node {config[dof].node}", config[dof].node)
             for dof in config.all_motors
         }
         self._by_id = {node.id: node for node in self.nodes.values()}
-        self._master_identifiers = self._identifiers_of_a_master()
+        # What only another master sends: no bus echoes our own frames.
+        self._master_identifiers = {NMT, SYNC, HEARTBEAT + config.master_node} | {
+            base + node for base in (RX_PDO_1, RX_PDO_2) for node in self._by_id
+        }
         self._second_master: can.Message | None = None
         self.is_monitoring = False
         self._next_heartbeat = 0.0
@@ -98,7 +98,7 @@ class CanopenMaster:
             self.send_nmt(START, node.id)
         self.is_monitoring = True
 
-    def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
+    def cycle(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
         """Run one cycle of frames; wait for the TxPDOs for `reply_timeout` at most."""
         self.receive_pending()
         now = time.monotonic()
@@ -178,11 +178,9 @@ class CanopenMaster:
         elif function == EMERGENCY and len(data) == 8 and data[:2] != b"\0\0":
             node.emergency = node.emergency or data
 
-    def _identifiers_of_a_master(self) -> frozenset[int]:
-        """Identifiers that only another master sends: no bus echoes our own frames."""
-        ids = self._by_id
-        commands = {base + node for base in (RX_PDO_1, RX_PDO_2) for node in ids}
-        return frozenset(commands | {NMT, SYNC, HEARTBEAT + self._config.master_node})
+    @abstractmethod
+    def _on_sdo_response(self, node: int, data: bytes) -> None:
+        """Handle the SDO response of a node."""
 
     def detect_second_master(self, duration: float) -> None:
         """Listen for another master for `duration` [s] before anything is sent."""

@@ -65,7 +65,10 @@ class EthercatFieldbus(Fieldbus):
 
     def __init__(self, config: DrivesConfig, pysoem: Any = None) -> None:
         self._config = config
-        self._soem = _load_library() if pysoem is None else pysoem
+        if pysoem is None:
+            require_extras("EtherCAT", ["ethercat"])
+            import pysoem  # type: ignore[no-redef]  # noqa: PLC0415
+        self._soem = pysoem
         self._master = self._soem.Master()
         self._age = self._answers = 0
         self._answered_at = time.monotonic()
@@ -251,10 +254,3 @@ class EthercatFieldbus(Fieldbus):
                 f"no answer to an SDO request for {what} ({error})",
                 "Check its supply and cables",
             ) from None
-
-
-def _load_library() -> Any:
-    require_extras("EtherCAT", ["ethercat"])
-    import pysoem  # noqa: PLC0415
-
-    return pysoem

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config, DrivesConfig
 from tautscope.errors import ConfigError, SignalError
-from tautscope.hardware.drives import open_drives
+from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.realtime import LOOP, realtime, short_switch_interval
-from tautscope.hardware.setpoint_thread import Motors, SetpointThread
+from tautscope.hardware.setpoint_thread import SetpointThread
 from tautscope.hardware.timing import Timing
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.measurement import Measurement
@@ -48,24 +48,19 @@ class MotorRig:
 
     Args:
         config: With a section ``drives``.
-        motors: Opens the drives.
+
+    Attributes:
+        timing: Timing of the set-points and frames since `reset`.
         warn: Called once when a problem begins that does not stop the run, and when it ends.
 
     Raises:
         ConfigError: The section ``drives`` is missing, or ``control.period`` is not its cycle.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        *,
-        motors: Callable[[DrivesConfig], Motors] = open_drives,
-        warn: Callable[[str], None] = _LOG.warning,
-    ) -> None:
+    def __init__(self, config: Config) -> None:
         self._drives = require_drives(config)
         self._config = config
-        self._open_motors = motors
-        self.warn = warn
+        self.warn: Callable[[str], None] = _LOG.warning
         self.timing = Timing(self._drives.cycle)
         self._resources = ExitStack()
         self._setpoints: SetpointThread | None = None
@@ -113,7 +108,7 @@ class MotorRig:
         try:
             self._open_sensors(self._resources)
             self._setpoints = SetpointThread(
-                self._drives, lambda: self._open_motors(self._drives), self.start, self.timing
+                self._drives, self._open_motors, self.start, self.timing
             )
             self._resources.callback(self._setpoints.stop)
             applied = self._setpoints.start()
@@ -184,6 +179,9 @@ class MotorRig:
         index = bisect_right(self._sent, (instant, float("inf"))) - 1
         sent, at = self._sent[max(index, 0)]
         return at + min(instant - sent, self.control_period)
+
+    def _open_motors(self) -> Drives:
+        return open_drives(self._drives)
 
     def _open_sensors(self, resources: ExitStack) -> None:
         """Open what measures, before the motors are enabled."""

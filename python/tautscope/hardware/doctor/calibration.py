@@ -49,7 +49,8 @@ def _check(
         for device, number in record.serial_numbers.items()
         if serial_numbers.get(device, number) != number
     ]
-    newer = [base for base in BASES.get(kind, ()) if _is_newer(getattr(config, base), record)]
+    bases = {base: getattr(config, base) for base in BASES.get(kind, ())}
+    newer = [base for base, used in bases.items() if used is not None and used.at > record.at]
     missing = note = ""
     if other:
         found, missing = f"{found}; another device is connected: {', '.join(other)}", todo
@@ -62,10 +63,6 @@ def _check(
         found += f"; stale: calibration.largest_age is {config.largest_age:g} days"
         note = todo
     return result("calibration", kind, found, data, missing=missing, note=note)
-
-
-def _is_newer(base: CalibrationRecord | None, record: CalibrationRecord) -> bool:
-    return base is not None and base.at > record.at
 
 
 def _days(age: float) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 import time
+from typing import Any
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
@@ -30,7 +31,7 @@ from tautscope.hardware.drive_group import (
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import FAULTS, Hello, Limits, Refusal, Request, State
-from tautscope.hardware.serial_line.line import Port, SerialLine
+from tautscope.hardware.serial_line.line import SerialLine
 
 _START = 4.0
 """How long a microcontroller may take to start after its port was opened [s]."""
@@ -51,7 +52,7 @@ class SerialDrives(DriveGroup):
         ModeRefusedError: It speaks another version of the protocol.
     """
 
-    def __init__(self, config: DrivesConfig, port: Port) -> None:
+    def __init__(self, config: DrivesConfig, port: Any) -> None:
         super().__init__(config)
         self._name = f"microcontroller on {config.channel}"
         self._line = SerialLine(port, config.channel)
