@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -21,7 +20,7 @@ from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
-from tautscope.loop.rig import Frame, Rig, Sample
+from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
@@ -37,7 +36,7 @@ from tautscope.ros2.wire import Qos
 
 _LOG = logging.getLogger(__name__)
 _IDLE_PERIOD = 0.005
-"""Time between two checks for requests while no loop runs, or a rig is opened [s]."""
+"""Time between two checks for requests while no loop runs [s]."""
 MakeRig = Callable[[Config], Rig]
 """Makes the rig that the loop commands."""
 
@@ -211,29 +210,13 @@ class NodeControl:
             return transition not in (CONFIGURE, ACTIVATE)
         return True
 
+    def _is_stopped(self) -> bool:
+        return self._take_command() in ("disable", "pause")
+
     def _release_rig(self) -> None:
         rig, self._rig = self._rig, None
         if rig is not None:
             rig.close()
-
-    def _reset(self, rig: Rig) -> Sample:
-        """Reset a rig, which takes seconds; drives of a configuration are stopped on request."""
-        if not isinstance(rig, HardwareRig):
-            return rig.reset()
-        is_over = threading.Event()
-
-        def watch() -> None:
-            while not is_over.wait(_IDLE_PERIOD):
-                if self._take_command() in ("disable", "pause"):
-                    rig.interrupt()
-
-        thread = threading.Thread(target=watch, name="opening")
-        thread.start()
-        try:
-            return rig.reset()
-        finally:
-            is_over.set()
-            thread.join()
 
     def _start_run(self) -> None:
         """Enable the rig and start the loop at rest, where the instrument is."""
@@ -242,12 +225,15 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
-        sample = self._reset(rig)
+        if isinstance(rig, HardwareRig):
+            sample = rig.reset_unless(self._is_stopped)
+            monitor = partial(PlausibilityMonitor, self._config)
+        else:
+            sample, monitor = rig.reset(), None
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
         self._achieved = Achieved(self._config)
-        is_hardware = isinstance(rig, HardwareRig)
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
             run = ControlRun(
@@ -257,7 +243,7 @@ class NodeControl:
                 self._source,
                 path=self._folder / f"ros2-{self._runs}.mcap",
                 executor=self._executor,
-                monitor=partial(PlausibilityMonitor, self._config) if is_hardware else None,
+                monitor=monitor,
             )
         if not self._config.dof:
             # The detector is made and used now, because its first use is slow.
