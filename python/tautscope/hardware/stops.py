@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config, DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN
 from tautscope.dof import Motor
 from tautscope.errors import CalibrationError, FollowingError
-from tautscope.hardware.drives import open_drives
+from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import exit_on_signals
 
@@ -104,15 +103,18 @@ def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -
     at = begin
     try:
         with open_drives(config) as drives:
-            for applied in drives.follow(_moved(drives.start(), dof, step, reach)):
-                at = float(applied[dof])
+            command = drives.start()
+            for _ in range(int(reach / abs(step))):
+                command[dof] += step
+                at = float(_paced(drives, command)[dof])
     except FollowingError as error:
         if not error.node.startswith(dof.label):
             raise
         with open_drives(config) as drives:
-            position = drives.start()
-            for _ in drives.follow(_moved(position, dof, -step, abs(begin - position[dof]))):
-                pass
+            command = drives.start()
+            while abs(begin - command[dof]) > abs(step):
+                command[dof] -= step
+                _paced(drives, command)
         return at
     raise CalibrationError(
         f"{dof.label}: no stop on a way of {reach:.4g} from {begin:.4g}",
@@ -120,11 +122,8 @@ def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -
     )
 
 
-def _moved(
-    start: NDArray[np.float64], dof: Motor, step: float, distance: float
-) -> Iterator[NDArray[np.float64]]:
-    """Commands from a start on, which move a motor by a step each."""
-    for count in range(1, int(distance / abs(step)) + 1):
-        command = start.copy()
-        command[dof] += count * step
-        yield command
+def _paced(drives: Drives, command: np.ndarray) -> np.ndarray:
+    began = time.monotonic()
+    applied = drives.exchange(command)
+    time.sleep(max(0.0, drives.cycle - (time.monotonic() - began)))
+    return applied
