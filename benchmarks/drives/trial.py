@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tautscope.bench.any_motors import Motors, make_motors
+from tautscope.bench.any_motors import make_motors
+from tautscope.bench.motors import SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.errors import DriveError
@@ -52,7 +53,7 @@ class Trial:
     """
 
     controller: int
-    motors: Motors
+    motors: SimulatedMotors
     config: DrivesConfig
     second: Connection
     positions: list[tuple[float, NDArray[np.float64]]] = field(default_factory=list)

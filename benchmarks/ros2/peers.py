@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.ros2 import messages, types
 from tautscope.ros2.clock import Clock
-from tautscope.ros2.control import NodeControl
+from tautscope.ros2.control import MakeRig, NodeControl
 from tautscope.ros2.endpoints import IMAGE, Subscription
 from tautscope.ros2.inputs import JoyAxes
-from tautscope.ros2.references import SERVO
 from tautscope.ros2.session import SENSOR_DATA, Node
-from tautscope.ros2.start import MakeRig, build_control
 from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]
@@ -109,7 +107,12 @@ class Peers:
     """
 
     def __init__(
-        self, config: Config, folder: Path, *, make_rig: MakeRig | None = None, device: str = SERVO
+        self,
+        config: Config,
+        folder: Path,
+        *,
+        make_rig: MakeRig | None = None,
+        device: str = "servo_jp",
     ) -> None:
         self.endpoint = free_endpoint()
         self.clock = SteppedClock()
@@ -117,7 +120,7 @@ class Peers:
         # A busy computer must not drop what is compared.
         self.node = Node("tautscope", connect="", listen=self.endpoint, is_blocking=True)
         self.other = Node("other", connect=self.endpoint, is_blocking=True)
-        self.control: NodeControl = build_control(
+        self.control = NodeControl(
             config, self.node, folder, InlineExecutor(), self.clock,
             make_rig=make_rig, device=device, layout=JoyAxes(),
         )  # fmt: skip
@@ -200,7 +203,7 @@ class Peers:
 
 
 @contextlib.contextmanager
-def peers(config: Config, folder: Path, **options: str) -> Iterator[Peers]:
+def peers(config: Config, folder: Path, **options: Any) -> Iterator[Peers]:
     """A node under test and another one."""
     both = Peers(config, folder, **options)
     try:

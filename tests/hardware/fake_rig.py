@@ -79,12 +79,10 @@ class Setup:
     def __init__(self, **changes: Any) -> None:
         self.motors, self.camera, self.warnings = FakeMotors(), FakeCamera(), list[str]()
         self.config = rig_config(**changes)
-        self.rig = HardwareRig(
-            self.config,
-            motors=lambda _: self.motors,
-            camera=lambda _: self.camera,
-            warn=self.warnings.append,
-        )
+        self.rig = HardwareRig(self.config)
+        self.rig._open_motors = lambda: self.motors  # type: ignore[method-assign]
+        self.rig._open_camera = lambda: self.camera  # type: ignore[method-assign]
+        self.rig.warn = self.warnings.append
 
 
 def rig_config(

@@ -71,7 +71,7 @@ def test_sdo_download(
     if (index, subindex) == (0x1800, 9):
         subindex = 2  # the manual writes four bytes, against the type of CiA 301
     with open_transcript({sent: answered}, node) as (fieldbus, bus):
-        fieldbus._sdo[Dof.INSERTION].od.indices.pop(index, None)
+        fieldbus._described[Dof.INSERTION].types.pop((index, subindex), None)
         fieldbus.write(Dof.INSERTION, Entry(index, subindex, "object", size), value)  # type: ignore[arg-type]
         assert bus.sent == [sent]
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
+import paced_motion
 import pytest
 from drive_settings import drives_config
 from tautscope.bench.can_bus import Hub, LocalBus
@@ -29,17 +31,8 @@ from tautscope.hardware.cia402 import STOPPED_STATES, State
 from tautscope.hardware.drives import Drives, open_drives
 from waiting import until
 
-SPEED = np.array([0.01, 1.5, 0.8])
+drive = partial(paced_motion.drive, speed=np.array([0.01, 1.5, 0.8]))
 Bench = Callable[..., SimulatedDrives]
-
-
-def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
-    """Move back and forth, paced."""
-    command = drives.last_command
-    for count in range(cycles):
-        command = command + speed * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
-        drives.exchange(command)
-        time.sleep(drives.cycle / 2)
 
 
 @contextmanager

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import termios
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import serial
+from paced_motion import drive, follow_in_si_units, running_line
 from serial_settings import AXES, serial_config, serial_document
-from tautscope.bench.microcontroller import FaultKind, SimulatedMicrocontroller
+from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.cli import main
-from tautscope.config import DrivesConfig, dump_config, from_document
+from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
@@ -38,26 +37,9 @@ from tautscope.hardware.serial_line.line import open_port
 from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
-SPEED = np.array([0.005, 0.5, 0.4])
 START = np.array([0.0, 1.5, 0.5])
 """Where the motors are at the start: at 0 counts."""
-
-
-@contextmanager
-def running(config: DrivesConfig) -> Iterator[tuple[SimulatedMicrocontroller, Drives]]:
-    """A simulated microcontroller and its master, enabled."""
-    with SimulatedMicrocontroller(config, start=START) as board, open_drives(config) as drives:
-        drives.start()
-        yield board, drives
-
-
-def drive(drives: Drives, cycles: int) -> None:
-    """Move back and forth, paced."""
-    command = drives.last_command
-    for count in range(cycles):
-        command = command + SPEED * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
-        drives.exchange(command)
-        time.sleep(drives.cycle / 2)
+running = partial(running_line, SimulatedMicrocontroller, START)
 
 
 def is_at_rest(motors: SimulatedMicrocontroller) -> bool:
@@ -67,23 +49,7 @@ def is_at_rest(motors: SimulatedMicrocontroller) -> bool:
 
 
 def test_motors_follow_in_si_units(tmp_path: Path) -> None:
-    config = serial_config(tmp_path)
-    demands: list[np.ndarray] = []
-
-    def plant(demand: np.ndarray) -> np.ndarray:
-        demands.append(demand.copy())
-        return demand
-
-    resolution = np.array([1 / config[dof].counts_per_unit for dof in Dof])
-    with SimulatedMicrocontroller(config, plant, start=START), open_drives(config) as drives:
-        position = drives.start()
-        assert (abs(position - START) <= resolution).all()
-        goal = START + np.array([0.05, 7.0, -3.2])
-        for step in range(1, 201):
-            drives.exchange(START + (goal - START) * step / 200)
-            time.sleep(drives.cycle / 4)
-        until(lambda: bool((abs(drives.exchange(goal) - goal) <= resolution).all()))
-        assert (abs(demands[-1] - goal) <= resolution).all()
+    follow_in_si_units(SimulatedMicrocontroller, serial_config(tmp_path), START)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +63,7 @@ def test_motors_follow_in_si_units(tmp_path: Path) -> None:
     ],
 )
 def test_fault_while_running_stops_all_motors(
-    tmp_path: Path, kind: FaultKind, error: type[DriveError], node: str, message: str
+    tmp_path: Path, kind: str, error: type[DriveError], node: str, message: str
 ) -> None:
     config = serial_config(tmp_path, state_timeout=1.0)
     with running(config) as (board, drives):
@@ -169,7 +135,10 @@ def test_stopped_released_and_disabled(tmp_path: Path) -> None:
         ({"after_quick_stop": "release"}, Drives.stop, State.DISABLED),
         ({}, Drives.disable, State.DISABLED),
     ):
-        with running(serial_config(tmp_path, **changes)) as (board, drives):
+        with running(serial_config(tmp_path, **changes)) as (
+            board,
+            drives,
+        ):
             drive(drives, 3)
             end(drives)
             assert board.board.state == state

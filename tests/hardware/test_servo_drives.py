@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from paced_motion import drive, follow_in_si_units, running_line
 from servo_settings import AXES, MODELS, START, servos_config, servos_document
-from tautscope.bench.servos import FaultKind, SimulatedServos
-from tautscope.config import DrivesConfig, dump_config, from_document
+from tautscope.bench.servos import SimulatedServos
+from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
@@ -31,24 +31,7 @@ from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
 FAMILIES = pytest.mark.parametrize("protocol", ["dynamixel", "feetech"])
-SPEED = np.array([0.005, 0.5, 0.4])
-
-
-@contextmanager
-def running(config: DrivesConfig) -> Iterator[tuple[SimulatedServos, Drives]]:
-    """Simulated servos and their master, enabled."""
-    with SimulatedServos(config, start=START) as servos, open_drives(config) as drives:
-        drives.start()
-        yield servos, drives
-
-
-def drive(drives: Drives, cycles: int) -> None:
-    """Move back and forth, paced."""
-    command = drives.last_command
-    for count in range(cycles):
-        command = command + SPEED * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
-        drives.exchange(command)
-        time.sleep(drives.cycle / 2)
+running = partial(running_line, SimulatedServos, START)
 
 
 def goals_are_positions(servos: SimulatedServos) -> bool:
@@ -64,24 +47,7 @@ def goals_are_positions(servos: SimulatedServos) -> bool:
 
 @FAMILIES
 def test_motors_follow_in_si_units_over_several_turns(protocol: str, tmp_path: Path) -> None:
-    config = servos_config(protocol, tmp_path)
-    demands: list[np.ndarray] = []
-
-    def plant(demand: np.ndarray) -> np.ndarray:
-        demands.append(demand.copy())
-        return demand
-
-    resolution = np.array([1 / config[dof].counts_per_unit for dof in Dof])
-    with SimulatedServos(config, plant, start=START) as servos, open_drives(config) as drives:
-        position = drives.start()
-        assert (abs(position - START) <= resolution).all()
-        goal = START + np.array([0.05, 7.0, -3.2])  # more than a turn of rotation
-        for step in range(1, 201):
-            command = START + (goal - START) * step / 200
-            drives.exchange(command)
-            time.sleep(drives.cycle / 4)
-        until(lambda: bool((abs(drives.exchange(goal) - goal) <= resolution).all()))
-        assert (abs(demands[-1] - goal) <= resolution).all()
+    servos = follow_in_si_units(SimulatedServos, servos_config(protocol, tmp_path), START)
     until(lambda: goals_are_positions(servos))
     assert [one.what for one in servos.events] == ["torque on"] * 3  # and held
 
@@ -132,9 +98,12 @@ def test_settings_are_read_back_and_stored_only_if_they_differ(
     ],
 )
 def test_fault_while_running_stops_all_motors(
-    protocol: str, tmp_path: Path, kind: FaultKind, error: type[DriveError], message: str
+    protocol: str, tmp_path: Path, kind: str, error: type[DriveError], message: str
 ) -> None:
-    with running(servos_config(protocol, tmp_path)) as (servos, drives):
+    with running(servos_config(protocol, tmp_path)) as (
+        servos,
+        drives,
+    ):
         drive(drives, 5)
         servos.inject(kind, Dof.ROTATION, 60.0)
         with pytest.raises(error, match=message) as found:
@@ -216,7 +185,10 @@ def test_a_pause_of_the_computer_while_it_waits_for_answers_is_told(
 @FAMILIES
 def test_released_and_disabled_motors_have_no_torque(protocol: str, tmp_path: Path) -> None:
     for changes, release in (({"after_quick_stop": "release"}, Drives.stop), ({}, Drives.disable)):
-        with running(servos_config(protocol, tmp_path, **changes)) as (servos, drives):
+        with running(servos_config(protocol, tmp_path, **changes)) as (
+            servos,
+            drives,
+        ):
             drive(drives, 3)
             release(drives)
             assert not any(one.get(one.family.torque) for one in servos.servos)
@@ -300,7 +272,10 @@ def test_doctor_finds_all_there_and_enables_nothing(protocol: str, tmp_path: Pat
 
 def test_lost_answers_are_counted_for_the_servo_that_is_silent(tmp_path: Path) -> None:
     """The others are read one by one meanwhile, and the motion goes on."""
-    with running(servos_config("dynamixel", tmp_path)) as (servos, drives):
+    with running(servos_config("dynamixel", tmp_path)) as (
+        servos,
+        drives,
+    ):
         late = drives.statistics.late
         servos.inject("drop", Dof.BENDING)
         until(lambda: drives.exchange(drives.last_command) is not None and late[Dof.BENDING] > 3)

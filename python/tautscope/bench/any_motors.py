@@ -19,15 +19,13 @@ from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
-from tautscope.bench.motors import OnCycle
+from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.bench.requests import read_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
 from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
 from tautscope.errors import ConfigError
 from tautscope.hardware.signals import exit_on_signals
-
-Motors = SimulatedDrives | SimulatedServos | SimulatedMicrocontroller
 
 
 def make_motors(
@@ -37,7 +35,7 @@ def make_motors(
     *,
     start: NDArray[np.float64],
     modes: tuple[int, ...] = (7, 8),
-) -> Motors:
+) -> SimulatedMotors:
     """The motors of a configuration, not yet running.
 
     Args:
@@ -86,8 +84,7 @@ def main() -> None:
             with suppress(KeyboardInterrupt):
                 for line in read_requests():
                     kind, label = line.split()
-                    motor = named[label]
-                    motors.clear(motor) if kind == "clear" else motors.inject(kind, motor)  # type: ignore[arg-type]
+                    motors.inject(kind, named[label])
         printer.close()
 
 

@@ -32,27 +32,21 @@ class LocalBus(can.BusABC):
 
     Args:
         channel: Path of the hub's socket.
-        timeout: How long to wait for the hub [s].
         **options: Options of python-can's buses; ``bitrate`` has no effect.
 
     Raises:
         can.CanInitializationError: There is no hub.
     """
 
-    def __init__(self, channel: str, timeout: float = 0.0, **options: Any) -> None:
+    def __init__(self, channel: str, **options: Any) -> None:
         self._buffer = bytearray()
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        deadline = time.monotonic() + timeout
-        while True:
-            try:
-                self._socket.connect(str(channel))
-                break
-            except OSError as error:
-                if time.monotonic() >= deadline:
-                    self._socket.close()
-                    self._is_shutdown = True
-                    raise can.CanInitializationError(f"no bus at {channel}: {error}") from error
-                time.sleep(0.01)
+        try:
+            self._socket.connect(str(channel))
+        except OSError as error:
+            self._socket.close()
+            self._is_shutdown = True
+            raise can.CanInitializationError(f"no bus at {channel}: {error}") from error
         self._poll = selectors.DefaultSelector()
         self._poll.register(self._socket, selectors.EVENT_READ)
         self.channel_info = f"tautscope {channel}"

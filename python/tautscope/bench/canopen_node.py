@@ -88,7 +88,9 @@ class CanopenNode:
         elif identifier == 0x600 + self.node and len(data) == 8 and self.state != STOPPED:
             self._send(0x580 + self.node, self._serve_sdo(data, now))
         elif identifier >= 0x700:
-            self._receive_heartbeat(identifier - 0x700, now)
+            consumer = self.values.get((0x1016, 1), 0)
+            if consumer >> 16 & 0x7F == identifier - 0x700 and consumer & 0xFFFF:
+                self.heartbeat_deadline = now + (consumer & 0xFFFF) / 1e3
         elif self.state == OPERATIONAL:
             for base in (0x1400, 0x1401):
                 if self._is_valid(base) and self.values[base, 1] & 0x7FF == identifier:
@@ -134,11 +136,6 @@ class CanopenNode:
             was, self.state = self.state, NMT_COMMANDS[command]
             if was == OPERATIONAL != self.state:
                 self.on_stopped(now)
-
-    def _receive_heartbeat(self, node: int, now: float) -> None:
-        consumer = self.values.get((0x1016, 1), 0)
-        if consumer >> 16 & 0x7F == node and consumer & 0xFFFF:
-            self.heartbeat_deadline = now + (consumer & 0xFFFF) / 1e3
 
     def _is_valid(self, base: int) -> bool:
         return not self.values[base, 1] & INVALID

@@ -10,7 +10,6 @@ from tautscope.bench.canopen_node import OUT_OF_RANGE, CanopenNode, Key, Send
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.scale import Scale
 
 _STATUSWORD = {
     State.NOT_READY: 0x0000,
@@ -23,8 +22,6 @@ _STATUSWORD = {
 }
 OVERHEATED = 0x4310
 """Emergency code: excess temperature of the drive."""
-
-
 SERIAL_NUMBERS = 0x7A00_0000
 """Serial number of a simulated drive, minus its node id."""
 
@@ -34,7 +31,7 @@ class SimulatedDrive(CanopenNode):
 
     Args:
         dof: DOF of its motor.
-        config: The true rig, which may differ from the master's configuration.
+        config: The true rig.
         send: See `CanopenNode`.
         log: Called with the time and the event.
         modes: Supported modes of operation.
@@ -52,7 +49,6 @@ class SimulatedDrive(CanopenNode):
         absent: frozenset[int] = frozenset(),
     ) -> None:
         super().__init__(config[dof].node, send, absent)
-        self.scale = Scale(config[dof], dof.label)
         self.cycle = config.cycle
         self.status = State.NOT_READY
         self.demand = 0

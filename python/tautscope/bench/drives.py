@@ -9,70 +9,63 @@ import heapq
 import itertools
 import time
 from collections.abc import Mapping
-from typing import Literal, get_args
+from functools import partial
 
 import can
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.bench.canopen_node import OPERATIONAL, Send
+from tautscope.bench.canopen_node import OPERATIONAL
 from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.hardware.cia402 import State
 
-FaultKind = Literal["drop", "delay", "fault", "freeze", "heartbeat", "refuse"]
-"""drop: neither sends nor receives. delay: sends late. fault: emergency object and fault state.
-freeze: the position does not change. heartbeat: sends no heartbeats. refuse: accepts no mode of
-operation."""
 
-
-class SimulatedDrives(SimulatedMotors[FaultKind]):
+class SimulatedDrives(SimulatedMotors):
     """Drives on one bus.
+
+    Their faults: drop: neither sends nor receives. delay: sends late. fault: emergency object and
+    fault state. freeze: the position does not change. heartbeat: sends no heartbeats. refuse:
+    accepts no mode of operation.
 
     Args:
         bus: The bus; it stays open.
-        config: The true rig: units, signs, node ids.
-        on_sync: The plant; without it, the motors follow ideally.
-        start: (n,) positions at power-on [m or rad].
+        config, on_cycle, start: As of `SimulatedMotors`.
         modes: Supported modes of operation; (7,) as the article's drives.
         absent: Indices of objects that they lack.
     """
+
+    kinds = ("drop", "delay", "fault", "freeze", "heartbeat", "refuse")
 
     def __init__(
         self,
         bus: can.BusABC,
         config: DrivesConfig,
-        on_sync: OnCycle | None = None,
+        on_cycle: OnCycle | None = None,
         *,
         start: NDArray[np.float64] | None = None,
         modes: tuple[int, ...] = (7, 8),
         absent: tuple[int, ...] = (),
     ) -> None:
-        super().__init__(config, get_args(FaultKind))
+        super().__init__(config, on_cycle, start)
         self._bus = bus
-        self._on_sync = on_sync
         self._delayed: list[tuple[float, int, can.Message]] = []
         self._order = itertools.count()
         self._drives = [
             SimulatedDrive(
                 dof,
                 config,
-                self._sender(dof),
-                self._logger(dof),
+                partial(self._send, dof),
+                partial(self._log, dof),
                 modes=frozenset(modes),
                 absent=frozenset(absent),
             )
             for dof in config.all_motors
         ]
-        where = (
-            np.zeros(len(config.all_motors))
-            if start is None
-            else np.asarray(start, dtype=np.float64)
-        )
-        for drive, position in zip(self._drives, where, strict=True):
-            drive.values[0x6064, 0] = drive.scale.to_counts(float(position))
+        for drive, scale, position in zip(self._drives, self._scales, self._start, strict=True):
+            drive.values[0x6064, 0] = scale.to_counts(float(position))
         self._is_disconnected = False
 
     @property
@@ -123,13 +116,18 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
     def _step_plant(self) -> None:
         if not any(drive.state == OPERATIONAL for drive in self._drives):
             return
-        demand = np.array([drive.scale.to_position(drive.demand) for drive in self._drives])
-        actual = demand if self._on_sync is None else self._on_sync(demand)
-        for dof, drive in zip(self._config.all_motors, self._drives, strict=True):
-            if "freeze" not in self._faults[dof]:
-                drive.set_position(drive.scale.to_counts(float(actual[dof])))
+        demand = np.array(
+            [
+                scale.to_position(drive.demand)
+                for scale, drive in zip(self._scales, self._drives, strict=True)
+            ]
+        )
+        actual = demand if self._on_cycle is None else self._on_cycle(demand)
+        for dof, faults in self._faults.items():
+            if "freeze" not in faults:
+                self._drives[dof].set_position(self._scales[dof].to_counts(float(actual[dof])))
 
-    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
+    def _apply(self, kind: str, dof: Motor, now: float) -> None:
         drive = self._drives[dof]
         if kind == "fault":
             drive.fail(now)
@@ -140,16 +138,13 @@ class SimulatedDrives(SimulatedMotors[FaultKind]):
     def _recover(self, dof: Motor) -> None:
         self._drives[dof].refuses_mode = False
 
-    def _sender(self, dof: Motor) -> Send:
-        def send(identifier: int, data: bytes) -> None:
-            faults = self._faults[dof]
-            if "drop" in faults or ("heartbeat" in faults and identifier >= 0x700):
-                return
-            message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
-            if "delay" in faults:
-                due = time.monotonic() + faults["delay"]
-                heapq.heappush(self._delayed, (due, next(self._order), message))
-            else:
-                self._transmit(message)
-
-        return send
+    def _send(self, dof: Motor, identifier: int, data: bytes) -> None:
+        faults = self._faults[dof]
+        if "drop" in faults or ("heartbeat" in faults and identifier >= 0x700):
+            return
+        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        if "delay" in faults:
+            due = time.monotonic() + faults["delay"]
+            heapq.heappush(self._delayed, (due, next(self._order), message))
+        else:
+            self._transmit(message)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 
@@ -25,7 +25,29 @@ class Event:
     what: str
 
 
-class EventPrinter:
+class Repeater:
+    """A thread that works every `period` [s], and once more when it is closed."""
+
+    def __init__(self, work: Callable[[], None], period: float) -> None:
+        self._work, self._period = work, period
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Work once more and end."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        lower_realtime_priority(OTHERS)
+        is_last = False
+        while not is_last:
+            is_last = self._stopping.wait(self._period)
+            self._work()
+
+
+class EventPrinter(Repeater):
     """A thread that prints each event as a JSON line.
 
     Args:
@@ -33,23 +55,10 @@ class EventPrinter:
     """
 
     def __init__(self, events: Callable[[], list[Event]]) -> None:
-        self._events = events
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        self._events, self._count = events, 0
+        super().__init__(self._print, 0.02)
 
-    def close(self) -> None:
-        """Print the remaining events and end."""
-        self._stopping.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        lower_realtime_priority(OTHERS)
-        count = 0
-        is_last = False
-        while not is_last:
-            is_last = self._stopping.wait(0.02)
-            for event in self._events()[count:]:
-                count += 1
-                line = {"time": event.time, "dof": event.dof, "what": event.what}
-                print(json.dumps(line), flush=True)
+    def _print(self) -> None:
+        for event in self._events()[self._count :]:
+            self._count += 1
+            print(json.dumps(asdict(event)), flush=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from pathlib import Path
 from typing import Self
@@ -10,9 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.bench.events import Repeater
 from tautscope.dof import Dof
 from tautscope.errors import OutputError
-from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 from tautscope.runs.recording import per_dof
 
 TRUTH = np.dtype([("time", "f8")] + [(f"true_{dof.label}", "f8") for dof in Dof])
@@ -37,33 +36,24 @@ class GroundTruthWriter:
         except OSError as error:
             allowed = f"a file that can be written ({error})"
             raise OutputError("--truth", str(path), allowed) from None
-        self._lines: deque[tuple[float, float, float, float]] = deque()
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="truth", daemon=True)
-        self._thread.start()
+        self._lines = deque([",".join(TRUTH.names or ())])
+        self._writing = Repeater(self._write, _WRITE_PERIOD)
 
     def add(self, now: float, state: NDArray[np.float64]) -> None:
         """Add the tip state (3,) [m, rad, rad] at a time of the monotonic clock [s]."""
-        self._lines.append((float(now), float(state[0]), float(state[1]), float(state[2])))
+        self._lines.append(f"{float(now)!r}," + ",".join(f"{x:.9g}" for x in state))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self._stopping.set()
-        self._thread.join()
+        self._writing.close()
+        self._file.close()
 
-    def _run(self) -> None:
-        lower_realtime_priority(OTHERS)
-        with self._file as file:
-            file.write(",".join(TRUTH.names or ()) + "\n")
-            is_last = False
-            while not is_last:
-                is_last = self._stopping.wait(_WRITE_PERIOD)
-                while self._lines:
-                    now, *state = self._lines.popleft()
-                    file.write(f"{now!r}," + ",".join(f"{x:.9g}" for x in state) + "\n")
-                file.flush()
+    def _write(self) -> None:
+        while self._lines:
+            self._file.write(self._lines.popleft() + "\n")
+        self._file.flush()
 
 
 def read_ground_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

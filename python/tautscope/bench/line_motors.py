@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.bench.motors import Kind, OnCycle, SimulatedMotors
+from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.errors import ConfigError
 
@@ -32,23 +32,25 @@ _TCGETS2 = 0x802C542A
 """ioctl(2): settings of a terminal with any bit rate (struct termios2), which `termios` lacks."""
 
 
-class LineMotors(SimulatedMotors[Kind]):
+class LineMotors(SimulatedMotors):
     """Motors on one line, which the `stops` of their configuration stop.
 
     Args:
         config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
-        kinds: The faults that they know.
-        on_cycle: The plant; without it, the motors follow ideally.
+        on_cycle, start: As of `SimulatedMotors`.
 
     Raises:
         ConfigError: The link cannot be made.
     """
 
     def __init__(
-        self, config: DrivesConfig, kinds: tuple[Kind, ...], on_cycle: OnCycle | None
+        self,
+        config: DrivesConfig,
+        on_cycle: OnCycle | None = None,
+        *,
+        start: NDArray[np.float64] | None = None,
     ) -> None:
-        super().__init__(config, kinds)
-        self._on_cycle = on_cycle
+        super().__init__(config, on_cycle, start)
         stops = [config[dof].stops or (-math.inf, math.inf) for dof in config.all_motors]
         self._lowest, self._highest = np.transpose(stops)
         self._has_goals = False

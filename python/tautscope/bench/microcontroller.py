@@ -6,55 +6,38 @@ with SimulatedMicrocontroller(config, plant): ...  # a client opens drives.chann
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench.line_motors import LineMotors
-from tautscope.bench.motors import OnCycle
 from tautscope.bench.serial_board import SerialBoard
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
-from tautscope.hardware.scale import Scale
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import FAULTS, Limits, Request, State
 
-FaultKind = Literal["drop", "delay", "fault", "freeze", "restart", "unplug"]
-"""drop: the microcontroller neither sends nor receives. delay: it answers late. fault: a motor's
-driver reports one. freeze: a motor is blocked. restart: the microcontroller restarts.
-unplug: the adapter is gone."""
 _LIMIT = 1 << 30
 _DRIVER = 1
 
 
-class SimulatedMicrocontroller(LineMotors[FaultKind]):
-    """Motors with encoders that count from where each DOF is at its ``home``.
+class SimulatedMicrocontroller(LineMotors):
+    """Motors with encoders that count from where each DOF is at its ``home``; see `LineMotors`.
 
-    After the fault ``restart`` they count from where they are then.
-
-    Args:
-        config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
-        on_cycle: The plant; without it, the motors follow ideally.
-        start: (n,) positions at the start [m or rad].
-
-    Raises:
-        ConfigError: The link cannot be made.
+    Their faults: drop: the microcontroller neither sends nor receives. delay: it answers late.
+    fault: a motor's driver reports one. freeze: a motor is blocked. restart: the microcontroller
+    restarts, and counts from where the motors are then. unplug: the adapter is gone.
     """
 
-    def __init__(
-        self,
-        config: DrivesConfig,
-        on_cycle: OnCycle | None = None,
-        *,
-        start: NDArray[np.float64] | None = None,
-    ) -> None:
-        super().__init__(config, get_args(FaultKind), on_cycle)
-        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+    kinds = ("drop", "delay", "fault", "freeze", "restart", "unplug")
+
+    def __init__(self, config: DrivesConfig, *arguments: Any, **options: Any) -> None:
+        super().__init__(config, *arguments, **options)
         self._at = [config[dof].node - 1 for dof in config.all_motors]
-        shafts = np.zeros(len(config.all_motors)) if start is None else start
         self.shafts = [
-            scale.to_counts(float(shaft)) for scale, shaft in zip(self._scales, shafts, strict=True)
+            scale.to_counts(float(shaft))
+            for scale, shaft in zip(self._scales, self._start, strict=True)
         ]
         """Where the motors are [counts from home]."""
         self._demands = [0.0] * len(self._scales)
@@ -90,7 +73,7 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
             self._has_goals |= message[0] == Request.SETPOINTS
         if self.board.state != before:
             for dof in self._config.all_motors:
-                self._logger(dof)(now, self.board.state.name.lower())
+                self._log(dof, now, self.board.state.name.lower())
 
     def _due(self) -> float:
         if self.board.state != State.ENABLED:
@@ -114,15 +97,15 @@ class SimulatedMicrocontroller(LineMotors[FaultKind]):
                 self.shafts[dof] = self._scales[dof].to_counts(float(position))
         self._publish()
 
-    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
+    def _apply(self, kind: str, dof: Motor, now: float) -> None:
         if kind == "fault":
             self.board.faults[self._at[dof]] = _DRIVER
-            self._logger(dof)(now, f"fault: {FAULTS[_DRIVER]}")
+            self._log(dof, now, f"fault: {FAULTS[_DRIVER]}")
         elif kind == "freeze":
             self._blocked.add(dof)
         elif kind == "restart":
             self._switch_on(list(self.shafts))
-            self._logger(dof)(now, "restart")
+            self._log(dof, now, "restart")
         elif kind == "unplug":
             self._unplug()
 

@@ -1,4 +1,4 @@
-"""What all simulated motors have in common: a thread, faults on request, events."""
+"""What all simulated motors have in common: a thread, a plant, faults on request, events."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Generic, Self, TypeVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,46 +16,60 @@ from tautscope.bench.events import Event
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.errors import ConfigError
+from tautscope.hardware.scale import Scale
 
-Kind = TypeVar("Kind", bound=str)
 OnCycle = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """The plant: demanded positions (n,) [m or rad] to positions; called once per cycle of the
 client (on CAN per SYNC, after the TxPDOs are sent), and by the clock where none cycles."""
 
 
-class SimulatedMotors(ABC, Generic[Kind]):
+class SimulatedMotors(ABC):
     """Motors on one bus, in a thread; a context manager.
 
     Leaving it switches their power off and raises the error that ended the thread, if any.
 
     Args:
-        config: The true rig.
+        config: The true rig, which may differ from the master's configuration.
+        on_cycle: The plant; without it, the motors follow ideally.
+        start: (n,) positions at power-on [m or rad]; zeros by default.
+
+    Attributes:
         kinds: The faults that they know.
     """
 
-    def __init__(self, config: DrivesConfig, kinds: tuple[Kind, ...]) -> None:
-        self._config = config
-        self._kinds = kinds
+    kinds: ClassVar[tuple[str, ...]]
+
+    def __init__(
+        self,
+        config: DrivesConfig,
+        on_cycle: OnCycle | None,
+        start: NDArray[np.float64] | None,
+    ) -> None:
+        self._config, self._on_cycle = config, on_cycle
+        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+        self._start = np.zeros(len(self._scales)) if start is None else start
         self._events: list[Event] = []
-        self._requests: deque[tuple[Kind | None, Motor, float]] = deque()
-        self._faults: dict[Motor, dict[Kind, float]] = {dof: {} for dof in self._config.all_motors}
+        self._requests: deque[tuple[str, Motor, float]] = deque()
+        self._faults: dict[Motor, dict[str, float]] = {dof: {} for dof in config.all_motors}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
         self._failure: BaseException | None = None
 
-    def inject(self, kind: Kind, dof: Motor, delay: float = 0.3) -> None:
+    def inject(self, kind: str, dof: Motor, delay: float = 0.3) -> None:
         """Inject a fault; `delay` [s] applies to the kind ``delay``.
+
+        ``clear`` ends the faults of a motor; one that it reports remains until it is reset.
 
         Raises:
             ConfigError: There is no such fault.
         """
-        if kind not in self._kinds:
-            raise ConfigError("fault", kind, "one of " + ", ".join(self._kinds))
+        if kind not in ("clear", *self.kinds):
+            raise ConfigError("fault", kind, "one of " + ", ".join(self.kinds))
         self._requests.append((kind, dof, delay))
 
     def clear(self, dof: Motor) -> None:
-        """End the faults of a motor; a fault that it reports remains until it is reset."""
-        self._requests.append((None, dof, 0.0))
+        """End the faults of a motor."""
+        self.inject("clear", dof)
 
     @property
     def events(self) -> list[Event]:
@@ -93,7 +107,7 @@ class SimulatedMotors(ABC, Generic[Kind]):
         """Wait for what comes next, and process it."""
 
     @abstractmethod
-    def _apply(self, kind: Kind, dof: Motor, now: float) -> None:
+    def _apply(self, kind: str, dof: Motor, now: float) -> None:
         """Begin a fault."""
 
     @abstractmethod
@@ -103,16 +117,13 @@ class SimulatedMotors(ABC, Generic[Kind]):
     def _apply_requests(self, now: float) -> None:
         while self._requests:
             kind, dof, delay = self._requests.popleft()
-            if kind is None:
+            if kind == "clear":
                 self._faults[dof].clear()
                 self._recover(dof)
             else:
                 self._faults[dof][kind] = delay
-                self._logger(dof)(now, f"fault: {kind}")
+                self._log(dof, now, f"fault: {kind}")
                 self._apply(kind, dof, now)
 
-    def _logger(self, dof: Motor) -> Callable[[float, str], None]:
-        def log(now: float, what: str) -> None:
-            self._events.append(Event(now, dof.label, what))
-
-        return log
+    def _log(self, dof: Motor, now: float, what: str) -> None:
+        self._events.append(Event(now, dof.label, what))

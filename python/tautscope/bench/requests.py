@@ -18,14 +18,11 @@ def read_requests() -> Iterator[str]:
     # Reading a terminal in the background fails then, instead of stopping the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     try:
-        if not _is_nothing():
+        is_nothing = sys.stdin is None or os.path.samestat(os.fstat(0), Path(os.devnull).stat())
+        if not is_nothing:
             yield from sys.stdin
             return
     except OSError:
         pass
     while True:
         signal.pause()
-
-
-def _is_nothing() -> bool:
-    return sys.stdin is None or os.path.samestat(os.fstat(0), Path(os.devnull).stat())

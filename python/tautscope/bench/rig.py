@@ -83,14 +83,13 @@ class Bench:
         """
         kind, _, part = line.strip().partition(" ")
         if part == CAMERA:
-            self._camera.clear() if kind == "clear" else self._camera.inject(kind)  # type: ignore[arg-type]
+            self._camera.inject(kind)
             self.drives.log_event(CAMERA, f"fault: {kind}")
             return
         names = [dof.label for dof in Dof]
         if part not in names:
             raise ConfigError("fault", line.strip(), "KIND " + ", KIND ".join([*names, CAMERA]))
-        dof = Dof[part.upper()]
-        self.drives.clear(dof) if kind == "clear" else self.drives.inject(kind, dof)  # type: ignore[arg-type]
+        self.drives.inject(kind, Dof[part.upper()])
 
     @property
     def events(self) -> list[Event]:

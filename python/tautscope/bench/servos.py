@@ -5,16 +5,15 @@ with SimulatedServos(config, plant): ...  # a client opens drives.channel as a s
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
-from typing import Literal, get_args
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench import servo_packets as packets
 from tautscope.bench.line_motors import LineMotors
-from tautscope.bench.motors import OnCycle
 from tautscope.bench.servo import (
     CHECKSUM,
     DATA_LENGTH,
@@ -26,44 +25,29 @@ from tautscope.bench.servo_packets import DynamixelPackets, FeetechPackets, Pack
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 
-FaultKind = Literal["drop", "delay", "fault", "freeze", "restart", "unplug"]
-"""drop: neither sends nor receives. delay: answers late. fault: overload, without torque. freeze:
-the motor is blocked, which ends in an overload. restart: the power fails for a moment. unplug: the
-adapter is gone, of all motors."""
 
+class SimulatedServos(LineMotors):
+    """Servos on one line; see `LineMotors`. Turns before the start are unknown to them.
 
-class SimulatedServos(LineMotors[FaultKind]):
-    """Servos on one line.
-
-    Args:
-        config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
-        on_cycle: The plant; without it, the motors follow ideally.
-        start: (n,) positions at power-on [m or rad]; turns before it are unknown to the servos.
-
-    Raises:
-        ConfigError: The link cannot be made.
+    Their faults: drop: neither sends nor receives. delay: answers late. fault: overload, without
+    torque. freeze: the motor is blocked, which ends in an overload. restart: the power fails for a
+    moment. unplug: the adapter is gone, of all motors.
     """
 
-    def __init__(
-        self,
-        config: DrivesConfig,
-        on_cycle: OnCycle | None = None,
-        *,
-        start: NDArray[np.float64] | None = None,
-    ) -> None:
-        super().__init__(config, get_args(FaultKind), on_cycle)
+    kinds = ("drop", "delay", "fault", "freeze", "restart", "unplug")
+
+    def __init__(self, config: DrivesConfig, *arguments: Any, **options: Any) -> None:
+        super().__init__(config, *arguments, **options)
         self._is_v2 = config.protocol == "dynamixel"
         self._codec = DynamixelPackets() if self._is_v2 else FeetechPackets()
         self._word = 2 if self._is_v2 else 1
-        self.servos = [
-            SimulatedServo(config[dof], dof.label, config.protocol, self._logger(dof))
-            for dof in config.all_motors
+        shafts = [
+            scale.to_counts(float(at)) for scale, at in zip(self._scales, self._start, strict=True)
         ]
-        for servo, position in zip(
-            self.servos, np.zeros(len(config.all_motors)) if start is None else start, strict=True
-        ):
-            servo.shaft = servo.scale.to_counts(float(position))
-            servo.restart(time.monotonic())
+        self.servos = [
+            SimulatedServo(config[dof], config.protocol, shaft, partial(self._log, dof))
+            for dof, shaft in zip(config.all_motors, shafts, strict=True)
+        ]
         self._events.clear()
 
     def _process(self, now: float) -> None:
@@ -73,11 +57,14 @@ class SimulatedServos(LineMotors[FaultKind]):
             self._serve(packet, now)
 
     def _advance(self, period: float, now: float) -> list[float]:
-        return [servo.advance(period, now) for servo in self.servos]
+        return [
+            scale.to_position(servo.advance(period, now))
+            for scale, servo in zip(self._scales, self.servos, strict=True)
+        ]
 
     def _move(self, positions: NDArray[np.float64]) -> None:
-        for servo, position in zip(self.servos, positions, strict=True):
-            servo.move(float(position))
+        for scale, servo, position in zip(self._scales, self.servos, positions, strict=True):
+            servo.move(scale.to_counts(float(position)))
 
     def _listening(self) -> Iterator[SimulatedServo]:
         return (
@@ -108,10 +95,8 @@ class SimulatedServos(LineMotors[FaultKind]):
             if answers:
                 raw = self._codec.status(name, error * self._is_v2 or servo.error, data)
                 at += self._wire_time(len(raw))
-                late = self._faults[self._config.all_motors[self.servos.index(servo)]].get(
-                    "delay", 0.0
-                )
-                self._queue(at + late, raw)
+                faults = self._faults[self._config.all_motors[self.servos.index(servo)]]
+                self._queue(at + faults.get("delay", 0.0), raw)
 
     def _carry_out(self, servo: SimulatedServo, packet: Packet, now: float) -> tuple[int, bytes]:
         """Carry out an instruction; error and data of the answer."""
@@ -147,7 +132,7 @@ class SimulatedServos(LineMotors[FaultKind]):
                 servo.write(address, data[start + 1 : start + 1 + size], now)
         self._has_goals |= address == servo.family.goal.address
 
-    def _apply(self, kind: FaultKind, dof: Motor, now: float) -> None:
+    def _apply(self, kind: str, dof: Motor, now: float) -> None:
         servo = self.servos[dof]
         servo.is_blocked |= kind == "freeze"
         if kind == "fault":

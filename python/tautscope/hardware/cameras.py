@@ -14,7 +14,7 @@ import numpy as np
 from tautscope.config import CameraConfig
 from tautscope.errors import CameraError, CameraMismatchError, NoRigError
 from tautscope.hardware.stream_clock import JUMP, StreamClock
-from tautscope.hardware.video import DecodedFrame, Decoder, Image, open_source
+from tautscope.hardware.video import DecodedFrame, Decoder, open_source
 from tautscope.loop.rig import Frame
 
 TEST_FRAMES = 8
@@ -220,7 +220,10 @@ def check_first_frames(captures: Sequence[Capture], config: CameraConfig) -> Non
             f"at least {TEST_FRAMES}; is the camera on, connected, and used by no other program?",
         )
     images = [capture.frame.image for capture in captures]
-    brightest = max(int(_brightness(image, config).max()) for image in images)
+    # The bytes of an image that contain brightness.
+    channel = {"yuyv": 0, "uyvy": 1}.get(config.pixel_format, slice(3))
+    bright = (im[..., channel] if im.ndim == 3 else im[: config.height] for im in images)
+    brightest = max(int(part.max()) for part in bright)
     if brightest <= source.darkest:
         raise CameraError(
             "camera.source",
@@ -250,11 +253,3 @@ def check_first_frames(captures: Sequence[Capture], config: CameraConfig) -> Non
             f"frames captured {worst:.3g} s before they arrived",
             f'0 to {_MAX_AGE:g} s; is {source.clock} the right clock? "stream" suits most sources',
         )
-
-
-def _brightness(image: Image, config: CameraConfig) -> Image:
-    """The bytes of an image that contain brightness."""
-    channel = {"yuyv": 0, "uyvy": 1}.get(config.pixel_format)
-    if channel is not None:
-        return image[..., channel]
-    return image[: config.height] if image.ndim == 2 else image[..., :3]

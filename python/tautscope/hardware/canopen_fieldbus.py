@@ -37,18 +37,17 @@ from tautscope.hardware.canopen_master import (
     open_bus,
 )
 from tautscope.hardware.cia402 import Mode
-from tautscope.hardware.eds import load_eds
+from tautscope.hardware.drive_group import Feedback
+from tautscope.hardware.eds import Described, load_eds
 from tautscope.hardware.fieldbus import (
     TX_PDO_OBJECTS,
     AbsentError,
-    Feedback,
+    Fieldbus,
     abort_error,
-    encoded,
     require_waived,
     target_object,
-    verify_setting,
 )
-from tautscope.hardware.object_dictionary import Entry
+from tautscope.hardware.object_dictionary import SIZES, Entry
 
 EVENT_DRIVEN, AT_EVERY_SYNC = 255, 1
 """PDO transmission types."""
@@ -79,8 +78,8 @@ class _Sdo(SdoClient):
         self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
 
 
-class CanopenFieldbus:
-    """Drives on a CAN bus; a `tautscope.hardware.fieldbus.Fieldbus`.
+class CanopenFieldbus(CanopenMaster, Fieldbus):
+    """Drives on a CAN bus; a `Fieldbus`.
 
     Args:
         config: Bus, nodes, timeouts.
@@ -93,20 +92,19 @@ class CanopenFieldbus:
     """
 
     def __init__(self, config: DrivesConfig, bus: can.BusABC | None = None) -> None:
-        self._config = config
-        dictionaries = {dof: _dictionary(config, dof) for dof in config.all_motors}
+        self._described = {dof: _description(config, dof) for dof in config.all_motors}
+        super().__init__(config, open_bus(config) if bus is None else bus)
         self._network = Network()
-        self._network.bus = self._bus = open_bus(config) if bus is None else bus
+        self._network.bus = self._bus
         self._sdo: dict[Motor, _Sdo] = {}
-        self._master = CanopenMaster(config, self._bus, self._on_sdo_response)
-        for dof, dictionary in dictionaries.items():
+        for dof in config.all_motors:
             node = config[dof].node
-            sdo = _Sdo(SDO_REQUEST + node, SDO_RESPONSE + node, dictionary)  # type: ignore[no-untyped-call]
+            sdo = _Sdo(SDO_REQUEST + node, SDO_RESPONSE + node, ObjectDictionary())  # type: ignore[no-untyped-call]
             sdo.network, sdo.timeout = self._network, config.request_timeout
-            sdo.receive_one = self._master.receive_one
+            sdo.receive_one = self.receive_one
             self._sdo[dof] = sdo
         try:
-            self._master.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)
+            self.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)
             for dof in config.all_motors:
                 self._check_identity(dof)
         except BaseException:
@@ -115,27 +113,14 @@ class CanopenFieldbus:
 
     def name(self, dof: Motor) -> str:
         """See `Fieldbus.name`."""
-        return self._master.nodes[dof].name
-
-    def read(self, dof: Motor, entry: Entry) -> int:
-        """Read a value by SDO upload; see `Fieldbus.read`."""
-        data = self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
-        return entry.decode(data)
-
-    def write(self, dof: Motor, entry: Entry, value: int) -> None:
-        """Write a value by SDO download; see `Fieldbus.write`."""
-        known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
-        size = len(known) // 8 if known is not None and known.fixed_size else entry.size
-        data = encoded(self.name(dof), entry, value, size)
-        what = f"{entry} = {value}"
-        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
+        return self.nodes[dof].name
 
     def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure producer and consumer heartbeats and the PDOs, and read them back."""
         config = self._config
         for dof in self._config.all_motors:
-            node = self._master.nodes[dof]
-            self._master.send_nmt(PRE_OPERATIONAL, node.id)
+            node = self.nodes[dof]
+            self.send_nmt(PRE_OPERATIONAL, node.id)
             period = round(config.heartbeat_period * 1e3)
             timeout = round(config.heartbeat_timeout * 1e3)
             node.has_heartbeat = self._set_or_waive(dof, objects.PRODUCER_HEARTBEAT, period)
@@ -148,10 +133,6 @@ class CanopenFieldbus:
             for base in (0x1402, 0x1403, 0x1801, 0x1802, 0x1803):
                 self._disable_pdo(dof, base)
 
-    def start(self) -> None:
-        """See `Fieldbus.start`."""
-        self._master.start()
-
     def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
         """See `Fieldbus.exchange`.
 
@@ -162,31 +143,31 @@ class CanopenFieldbus:
             SecondMasterError: Another master sends frames.
             BusError: The bus is lost.
         """
-        self._master.receive_pending()
-        self._master.check()  # frames since the last cycle
-        feedback = self._master.exchange(controlwords, targets)
-        self._master.check()
+        self.receive_pending()
+        self.check()  # frames since the last cycle
+        feedback = self.cycle(controlwords, targets)
+        self.check()
         return feedback
 
     def broadcast(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
         """See `Fieldbus.broadcast`."""
-        for node in self._master.nodes.values():
+        for node in self.nodes.values():
             node.controlword = None  # send it in every cycle
-        return self._master.exchange([controlword] * len(targets), targets)
+        return self.cycle([controlword] * len(targets), targets)
 
     def stop_communication(self, dofs: Sequence[Motor]) -> None:
         """Stop these nodes (NMT); without the master's heartbeat they quick-stop by themselves."""
-        self._master.is_monitoring = False
+        self.is_monitoring = False
         with suppress(DriveError):  # the bus may be lost
             for dof in dofs:
-                self._master.send_nmt(STOP, self._master.nodes[dof].id)
+                self.send_nmt(STOP, self.nodes[dof].id)
 
     def close(self) -> None:
         """Switch the drives' heartbeat consumers off and release the bus."""
         if self._network.bus is None:
             return
-        if self._master.is_monitoring:
-            self._master.is_monitoring = False
+        if self.is_monitoring:
+            self.is_monitoring = False
             for dof in self._config.all_motors:
                 try:
                     with suppress(SettingRefusedError):  # it may lack the object
@@ -202,8 +183,18 @@ class CanopenFieldbus:
             if sdo.tx_cobid == SDO_RESPONSE + node:
                 sdo.responses.put(data)
 
+    def _size(self, dof: Motor, entry: Entry) -> int:
+        number = self._described[dof].types.get((entry.index, entry.subindex), 0)
+        return SIZES.get(number, entry.size)
+
+    def _upload(self, dof: Motor, entry: Entry) -> bytes:
+        return self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
+
+    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
+        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
+
     def _request(self, dof: Motor, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
-        node = self._master.nodes[dof]
+        node = self.nodes[dof]
         try:
             data = transfer(self._sdo[dof])
         except SdoAbortedError as error:
@@ -220,7 +211,7 @@ class CanopenFieldbus:
 
     def _set(self, dof: Motor, entry: Entry, value: int) -> None:
         self.write(dof, entry, value)
-        verify_setting(self, dof, entry, value)
+        self.verify(dof, entry, value)
 
     def _set_or_waive(self, dof: Motor, entry: Entry, value: int) -> bool:
         """Set a value and read it back; False if that fails and is waived."""
@@ -237,7 +228,7 @@ class CanopenFieldbus:
         """Configure a PDO in the order of CiA 301: invalidate, change, validate."""
         name = f"PDO 0x{base:04X}"
         identifier, transmission, count, *mapped = objects.pdo_entries(base, base + 0x200, 0, name)
-        valid = cob + self._master.nodes[dof].id
+        valid = cob + self.nodes[dof].id
         if base >= 0x1800:
             valid |= self.read(dof, identifier) & NO_RTR
         self.write(dof, identifier, valid | INVALID)
@@ -250,10 +241,10 @@ class CanopenFieldbus:
 
     def _check_identity(self, dof: Motor) -> None:
         """Check that the EDS file describes this drive."""
-        described = self._sdo[dof].od.device_information
+        described = self._described[dof]
         for entry, number in (
-            (objects.VENDOR_ID, described.vendor_number),
-            (objects.PRODUCT_CODE, described.product_number),
+            (objects.VENDOR_ID, described.vendor),
+            (objects.PRODUCT_CODE, described.product),
         ):
             if number and (found := self.read(dof, entry)) != number:
                 raise ConfigError(
@@ -274,7 +265,7 @@ class CanopenFieldbus:
             pass
 
 
-def _dictionary(config: DrivesConfig, dof: Motor) -> ObjectDictionary:
+def _description(config: DrivesConfig, dof: Motor) -> Described:
     axis = config[dof]
     try:
         return load_eds(axis.eds, axis.node)

@@ -16,15 +16,17 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import can
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import BusError, EmergencyError, HeartbeatError, SecondMasterError, StateError
-from tautscope.hardware.fieldbus import EMPTY_TX_PDO, TX_PDO_SIZE, Feedback, TxPdo
+from tautscope.hardware.drive_group import Feedback
+from tautscope.hardware.fieldbus import TX_PDO
 
 NMT, SYNC, EMERGENCY = 0x000, 0x080, 0x080
 TX_PDO_1, RX_PDO_1, RX_PDO_2 = 0x180, 0x200, 0x300
@@ -40,10 +42,8 @@ class Node:
     Attributes:
         name: Its name for messages.
         id: Node id.
-        tx_pdo: Its newest process data.
-        age: Cycles since they came.
-        answers: Number of TxPDOs received.
-        answered_at, heartbeat_at: Time of its last TxPDO and heartbeat [s, monotonic clock].
+        feedback: Its newest process data.
+        heartbeat_at: Time of its last heartbeat [s, monotonic clock].
         nmt_state: NMT state in its last heartbeat.
         was_operational: Whether a heartbeat has reported operational.
         has_heartbeat: Whether it sends heartbeats; else its answers alone are checked.
@@ -53,10 +53,7 @@ class Node:
 
     name: str
     id: int
-    tx_pdo: TxPdo = EMPTY_TX_PDO
-    age: int = 0
-    answers: int = 0
-    answered_at: float = 0.0
+    feedback: Feedback = field(default_factory=Feedback)
     heartbeat_at: float = 0.0
     nmt_state: int = PRE_OPERATIONAL_STATE
     was_operational: bool = False
@@ -65,27 +62,26 @@ class Node:
     emergency: bytes = b""
 
 
-class CanopenMaster:
+class CanopenMaster(ABC):
     """Exchanges frames with drives and checks their heartbeats and emergency objects.
 
     Args:
         config: Node ids and timeouts.
         bus: An open CAN bus.
-        on_sdo_response: Called with node id and data of each SDO response.
     """
 
-    def __init__(
-        self, config: DrivesConfig, bus: can.BusABC, on_sdo_response: Callable[[int, bytes], None]
-    ) -> None:
+    def __init__(self, config: DrivesConfig, bus: can.BusABC) -> None:
         self._config = config
         self._bus = bus
-        self._on_sdo_response = on_sdo_response
         self.nodes = {
             dof: Node(f"{dof.label}, node {config[dof].node}", config[dof].node)
             for dof in config.all_motors
         }
         self._by_id = {node.id: node for node in self.nodes.values()}
-        self._master_identifiers = self._identifiers_of_a_master()
+        # What only another master sends: no bus echoes our own frames.
+        self._master_identifiers = {NMT, SYNC, HEARTBEAT + config.master_node} | {
+            base + node for base in (RX_PDO_1, RX_PDO_2) for node in self._by_id
+        }
         self._second_master: can.Message | None = None
         self.is_monitoring = False
         self._next_heartbeat = 0.0
@@ -95,14 +91,14 @@ class CanopenMaster:
         self.receive_pending()  # discard frames of an earlier run
         now = time.monotonic()
         for node in self.nodes.values():
-            node.heartbeat_at = node.answered_at = now
+            node.heartbeat_at = node.feedback.answered_at = now
             node.nmt_state, node.was_operational = PRE_OPERATIONAL_STATE, False
-            node.tx_pdo = node.tx_pdo._replace(statusword=0)
-            node.controlword, node.age, node.emergency = None, 0, b""
+            node.feedback.statusword = node.feedback.age = 0
+            node.controlword, node.emergency = None, b""
             self.send_nmt(START, node.id)
         self.is_monitoring = True
 
-    def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
+    def cycle(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
         """Run one cycle of frames; wait for the TxPDOs for `reply_timeout` at most."""
         self.receive_pending()
         now = time.monotonic()
@@ -116,18 +112,16 @@ class CanopenMaster:
         for dof, node in self.nodes.items():
             self.send(RX_PDO_2 + node.id, struct.pack("<i", targets[dof]))
         for node in self.nodes.values():
-            node.age += 1
+            node.feedback.age += 1
         self.send(SYNC, b"")
         deadline = time.monotonic() + self._config.reply_timeout
-        while any(node.age for node in self.nodes.values()):
+        while any(node.feedback.age for node in self.nodes.values()):
             left = deadline - time.monotonic()
             if left <= 0 or not self.receive_one(left):
                 break
         now = time.monotonic()
         return [
-            Feedback(
-                *node.tx_pdo, age=node.age, answers=node.answers, silence=now - node.answered_at
-            )
+            replace(node.feedback, silence=now - node.feedback.answered_at)
             for node in self.nodes.values()
         ]
 
@@ -172,10 +166,10 @@ class CanopenMaster:
             return
         function = identifier & 0x780
         now = time.monotonic()
-        if function == TX_PDO_1 and len(data) >= TX_PDO_SIZE:
-            node.tx_pdo = TxPdo.unpack(data)
-            node.age, node.answered_at = 0, now
-            node.answers += 1
+        if function == TX_PDO_1 and len(data) >= TX_PDO.size:
+            one = node.feedback
+            one.statusword, one.position, one.mode = TX_PDO.unpack_from(data)
+            one.age, one.answered_at, one.answers = 0, now, one.answers + 1
         elif function == SDO_RESPONSE and len(data) == 8:
             self._on_sdo_response(node.id, data)
         elif function == HEARTBEAT and data:
@@ -184,11 +178,9 @@ class CanopenMaster:
         elif function == EMERGENCY and len(data) == 8 and data[:2] != b"\0\0":
             node.emergency = node.emergency or data
 
-    def _identifiers_of_a_master(self) -> frozenset[int]:
-        """Identifiers that only another master sends: no bus echoes our own frames."""
-        ids = self._by_id
-        commands = {base + node for base in (RX_PDO_1, RX_PDO_2) for node in ids}
-        return frozenset(commands | {NMT, SYNC, HEARTBEAT + self._config.master_node})
+    @abstractmethod
+    def _on_sdo_response(self, node: int, data: bytes) -> None:
+        """Handle the SDO response of a node."""
 
     def detect_second_master(self, duration: float) -> None:
         """Listen for another master for `duration` [s] before anything is sent."""

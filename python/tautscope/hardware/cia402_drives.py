@@ -15,9 +15,8 @@ from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
 from tautscope.hardware.cia402_errors import ignores_setpoints, state_error, transition_error
 from tautscope.hardware.commissioning import commission
-from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
-from tautscope.hardware.fieldbus import AbsentError, Feedback, Fieldbus
-from tautscope.hardware.object_dictionary import Entry
+from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup, DriveStatus, Feedback
+from tautscope.hardware.fieldbus import Fieldbus
 
 MODES = {
     1: "profile position",
@@ -35,7 +34,7 @@ CONFIRMATIONS = 2
 """Consecutive answers that confirm a state; the first may predate the command."""
 
 
-class Cia402Drives:
+class Cia402Drives(DriveGroup):
     """CiA 402 drives on a fieldbus; a `tautscope.hardware.drive_group.DriveGroup`.
 
     Args:
@@ -46,13 +45,11 @@ class Cia402Drives:
     """
 
     def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
-        self._config = config
+        super().__init__(config)
         self._bus = bus
         self._modes: dict[Motor, Mode] = {}
         self._controlwords = [cia402.DISABLE_VOLTAGE] * len(config.all_motors)
         self._targets = [0] * len(config.all_motors)
-        self._feedback: list[Feedback] = []
-        self._is_operational = False
 
     @property
     def pending(self) -> int:
@@ -67,15 +64,15 @@ class Cia402Drives:
 
     def serial_number(self, dof: Motor) -> str:
         """The serial number in the identity object (0x1018:4)."""
-        number = self._read_or_zero(dof, objects.SERIAL_NUMBER)
+        number = self._bus.read_or_zero(dof, objects.SERIAL_NUMBER)
         return f"{number:08X}" if number else ""
 
     def status(self, dof: Motor) -> DriveStatus:
         """Read state, position, supported modes and identity."""
-        supported = self._read_or_zero(dof, objects.SUPPORTED_MODES)
+        supported = self._bus.read_or_zero(dof, objects.SUPPORTED_MODES)
         state = cia402.state_of(self._bus.read(dof, objects.STATUSWORD))
         position = self._bus.read(dof, objects.POSITION_ACTUAL)
-        vendor = self._read_or_zero(dof, objects.VENDOR_ID)
+        vendor = self._bus.read_or_zero(dof, objects.VENDOR_ID)
         modes = [number for number in MODES if supported >> (number - 1) & 1]
         problem = ""
         if state in (State.FAULT, State.FAULT_REACTION):
@@ -140,7 +137,7 @@ class Cia402Drives:
             StateError: A drive is in fault, or did not reach a state within `state_timeout`.
             SilentDriveError: A drive did not answer within `state_timeout`.
         """
-        self._is_operational = True
+        self._was_enabled = True
         if reset_faults:
             self._run_transition(self._reset_fault)
         self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
@@ -151,26 +148,11 @@ class Cia402Drives:
         self._run_transition(self._start_following)
         return self._feedback
 
-    def quick_stop(self) -> list[str]:
-        """Quick-stop all drives; names of those that do not confirm it within `state_timeout`.
-
-        Does nothing if the drives never ran, or are stopped already.
-        """
-        if not self._feedback:
-            return []
-        self._feedback = []
+    def _stop(self) -> list[str]:
         return self._command_until(cia402.QUICK_STOP, cia402.STOPPED_STATES)
 
-    def disable(self) -> list[str]:
-        """Quick-stop, then disable voltage; names of the drives that do not confirm it.
-
-        Disable voltage alone would let a moving motor coast. Does nothing if the drives never ran.
-        """
-        if not self._is_operational:
-            return []
-        return self.quick_stop() or self._command_until(
-            cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES
-        )
+    def _switch_off(self) -> list[str]:
+        return self._command_until(cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES)
 
     def close(self) -> None:
         """Release the bus; a second call does nothing."""
@@ -202,7 +184,7 @@ class Cia402Drives:
                 replace(one, statusword=one.statusword & ~cia402.FOLLOWING_ERROR_BIT)
                 for one in feedback
             ]
-        self._feedback = feedback
+        self._feedback, self._is_moving = feedback, True
 
     def _follows(self, feedback: Feedback) -> bool:
         """Whether bit 12 is set or waived."""
@@ -272,9 +254,3 @@ class Cia402Drives:
             )
         if not self._follows(feedback):
             raise ignores_setpoints(name, feedback)
-
-    def _read_or_zero(self, dof: Motor, entry: Entry) -> int:
-        try:
-            return self._bus.read(dof, entry)
-        except AbsentError:
-            return 0

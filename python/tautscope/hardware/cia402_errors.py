@@ -6,7 +6,7 @@ from tautscope.config.drives import waiver_hint
 from tautscope.errors import DriveError, ModeRefusedError, SilentDriveError, StateError
 from tautscope.hardware import cia402
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.fieldbus import Feedback
+from tautscope.hardware.drive_group import Feedback
 
 
 def mode_refused(name: str, mode: Mode, shown: int) -> ModeRefusedError:

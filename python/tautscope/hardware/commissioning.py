@@ -20,12 +20,7 @@ from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode
 from tautscope.hardware.cia402_errors import mode_refused
 from tautscope.hardware.drive_group import CommissionedDrive
-from tautscope.hardware.fieldbus import (
-    AbsentError,
-    Fieldbus,
-    require_waived,
-    verify_setting,
-)
+from tautscope.hardware.fieldbus import AbsentError, Fieldbus, require_waived
 from tautscope.hardware.object_dictionary import Entry
 from tautscope.hardware.scale import Scale
 
@@ -57,8 +52,8 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Motor) -> CommissionedD
     _LOG.info("%s: mode %d, settings read back", bus.name(dof), mode)
     return CommissionedDrive(
         bus.name(dof),
-        setup.read_or(objects.VENDOR_ID, 0),
-        setup.read_or(objects.PRODUCT_CODE, 0),
+        bus.read_or_zero(dof, objects.VENDOR_ID),
+        bus.read_or_zero(dof, objects.PRODUCT_CODE),
         mode,
         setup.settings,
         tuple(setup.absent),
@@ -99,8 +94,8 @@ class _DriveSetup:
         self._set(objects.FOLLOWING_ERROR_TIMEOUT, round(self._config.following_timeout * 1e3))
         counts = turns = 0
         if has_speed_limits:
-            counts = self.read_or(objects.ENCODER_INCREMENTS, 0)
-            turns = self.read_or(objects.MOTOR_REVOLUTIONS, 0)
+            counts = self._bus.read_or_zero(self._dof, objects.ENCODER_INCREMENTS)
+            turns = self._bus.read_or_zero(self._dof, objects.MOTOR_REVOLUTIONS)
         if counts and turns:
             self._set(objects.MAX_MOTOR_SPEED, -(-speed * 60 * turns // counts))  # [1/min]
 
@@ -122,8 +117,11 @@ class _DriveSetup:
             self._set(objects.INTERPOLATION_EXPONENT, -3)
             self._set(objects.INTERPOLATION_TIME, round(config.cycle * 1e3), required=True)
         if is_interpolated:
-            for value in (0, 1):
-                self._clear_buffer(value)
+            for value in (0, 1):  # a command that cannot be read back
+                try:
+                    bus.write(dof, objects.INTERPOLATION_BUFFER_CLEAR, value)
+                except AbsentError:
+                    self.absent.append(str(objects.INTERPOLATION_BUFFER_CLEAR))
         self._write(objects.MODES_OF_OPERATION, mode)
         deadline = time.monotonic() + config.state_timeout
         while (shown := bus.read(dof, objects.MODE_DISPLAY)) != mode:
@@ -133,12 +131,6 @@ class _DriveSetup:
                 raise mode_refused(bus.name(dof), mode, shown)
             time.sleep(config.cycle)
         return mode
-
-    def read_or(self, entry: Entry, default: int) -> int:
-        try:
-            return self._bus.read(self._dof, entry)
-        except AbsentError:
-            return default
 
     def _modes(self) -> tuple[Mode, ...]:
         """The mode to enter; both, in this order, if the drive does not tell and that is waived."""
@@ -162,17 +154,10 @@ class _DriveSetup:
             "drive or firmware",
         )
 
-    def _clear_buffer(self, value: int) -> None:
-        """Write 0x60C4:6, a command that cannot be read back."""
-        try:
-            self._bus.write(self._dof, objects.INTERPOLATION_BUFFER_CLEAR, value)
-        except AbsentError:
-            self.absent.append(str(objects.INTERPOLATION_BUFFER_CLEAR))
-
     def _set(self, entry: Entry, value: int, *, required: bool = False) -> None:
         try:
             self._write(entry, value)
-            verify_setting(self._bus, self._dof, entry, value)
+            self._bus.verify(self._dof, entry, value)
         except SettingRefusedError as error:
             if required or not isinstance(error, AbsentError):
                 require_waived(self._config, entry, error)

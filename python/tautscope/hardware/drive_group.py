@@ -2,52 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
+from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
-
-
-class Feedback(Protocol):
-    """What a drive reported last."""
-
-    @property
-    def position(self) -> int:
-        """Position actual value [counts]."""
-        ...
-
-    @property
-    def age(self) -> int:
-        """Cycles since it was received; 0 if it came in the present cycle."""
-        ...
-
-    @property
-    def answers(self) -> int:
-        """Number of answers since the bus was opened."""
-        ...
-
-    @property
-    def silence(self) -> float:
-        """Time since the last answer [s]."""
-        ...
-
-    @property
-    def reports_following_error(self) -> bool:
-        """Whether the drive itself reports a following error."""
-        ...
+from tautscope.errors import StateError
+from tautscope.hardware.cia402 import FOLLOWING_ERROR_BIT, Mode
 
 
 @dataclass(slots=True)
-class NewestAnswer:
-    """The newest answer of a motor on a serial line: a `Feedback`."""
+class Feedback:
+    """What a drive reported last.
+
+    Attributes:
+        position: Position actual value [counts].
+        age: Cycles since it was received; 0 if it came in the present cycle.
+        answers: Number of answers since the bus was opened.
+        answered_at: Time of the last one [s, monotonic clock].
+        silence: Time since the last one [s].
+        statusword, mode: Of a CiA 402 drive.
+    """
 
     position: int = 0
     age: int = 0
     answers: int = 0
-    silence: float = 0.0
-    reports_following_error: bool = False
     answered_at: float = 0.0
+    silence: float = 0.0
+    statusword: int = 0
+    mode: int = 0
+
+    @property
+    def reports_following_error(self) -> bool:
+        """Whether the drive reports a following error; in mode 7 the bit means another thing."""
+        is_cyclic = self.mode == Mode.CYCLIC_SYNCHRONOUS_POSITION
+        return is_cyclic and bool(self.statusword & FOLLOWING_ERROR_BIT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,30 +80,40 @@ class DriveStatus:
     data: dict[str, Any] = field(default_factory=dict)
 
 
-class DriveGroup(Protocol):
+class DriveGroup(ABC):
     """The drives of a rig, one per motor, on one bus; for use by one thread.
 
     Every method may raise `tautscope.errors.DriveError`: the bus is lost, or a drive does not
     answer or reports a fault. Positions are in counts, see `tautscope.hardware.scale.Scale`.
+
+    Args:
+        config: Drives, limits and timeouts.
     """
+
+    def __init__(self, config: DrivesConfig) -> None:
+        self._config = config
+        self._feedback = [Feedback() for _ in config.all_motors]
+        self._sent_at = 0.0
+        self._is_moving = self._was_enabled = False
 
     @property
     def pending(self) -> int:
         """Number of newest set-points that cannot have an effect yet when positions are read."""
-        ...
+        return 1
 
+    @abstractmethod
     def name(self, dof: Motor) -> str:
         """The drive's name for messages: DOF and node."""
-        ...
 
     def serial_number(self, dof: Motor) -> str:
         """The drive's serial number; empty where it is missing."""
-        ...
+        return ""
 
+    @abstractmethod
     def status(self, dof: Motor) -> DriveStatus:
         """Read identity, state and position; nothing is written."""
-        ...
 
+    @abstractmethod
     def commission(self, dof: Motor) -> CommissionedDrive:
         """Set protections, limits and mode, and read them back; the drive stays disabled.
 
@@ -120,47 +121,84 @@ class DriveGroup(Protocol):
             ModeRefusedError: It cannot follow a stream of positions.
             SettingRefusedError: A setting was refused, or reads back differently.
         """
-        ...
 
-    def configure(self) -> None:
+    def configure(self) -> None:  # noqa: B027  not every bus needs it
         """Configure the supervision of the connection, after `commission` of every drive."""
-        ...
 
+    @abstractmethod
     def read_positions(self) -> list[int]:
         """Read the positions while the drives are disabled."""
-        ...
 
     def start(self, positions: list[int]) -> None:
         """Start the exchange at these positions; from now on it must go on in time."""
-        ...
+        self._sent_at = time.monotonic()
+        for one, position in zip(self._feedback, positions, strict=True):
+            one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, self._sent_at
 
-    def probe(self) -> Sequence[Feedback]:
+    @abstractmethod
+    def probe(self) -> list[Feedback]:
         """Exchange one cycle in which no motor is enabled."""
-        ...
 
-    def enable(self, *, reset_faults: bool) -> Sequence[Feedback]:
+    @abstractmethod
+    def enable(self, *, reset_faults: bool) -> list[Feedback]:
         """Enable the motors where they are, and cycle until they follow set-points.
 
         Raises:
             StateError: A drive is in fault, or did not become enabled within `state_timeout`.
         """
-        ...
 
-    def exchange(self, targets: list[int]) -> Sequence[Feedback]:
+    @abstractmethod
+    def exchange(self, targets: list[int]) -> list[Feedback]:
         """Send a set-point to each drive and wait for answers, no longer than `reply_timeout`."""
-        ...
 
     def quick_stop(self) -> list[str]:
         """Stop all motors; names of those that do not confirm it within `state_timeout`.
 
         Does nothing if they never ran, or are stopped already.
         """
-        ...
+        if not self._is_moving:
+            return []
+        self._is_moving = False
+        return self._stop()
 
     def disable(self) -> list[str]:
-        """`quick_stop`, then switch the motors off; names of those that do not confirm it."""
-        ...
+        """`quick_stop`, then switch the motors off; names of those that do not confirm it.
 
+        Switching off alone would let a moving motor coast. Does nothing if they never ran.
+        """
+        if not self._was_enabled:
+            return []
+        return self.quick_stop() or self._switch_off()
+
+    @abstractmethod
     def close(self) -> None:
         """Release the bus; a second call does nothing."""
-        ...
+
+    @abstractmethod
+    def _stop(self) -> list[str]:
+        """Stop all motors; names of those that do not confirm it."""
+
+    @abstractmethod
+    def _switch_off(self) -> list[str]:
+        """Switch all motors off; names of those that do not confirm it."""
+
+    def _check_pause(self, name: str) -> None:
+        """Note that a set-point is sent, unless the drives' watchdogs may have stopped them.
+
+        Raises:
+            StateError: More than `heartbeat_timeout` passed since the last set-point.
+        """
+        now = time.monotonic()
+        pause, self._sent_at = now - self._sent_at, now
+        if pause > self._config.heartbeat_timeout:
+            raise paused(name, self._config, pause)
+
+
+def paused(name: str, config: DrivesConfig, pause: float) -> StateError:
+    """The error for drives that stopped, or may have, because of a pause [s] of set-points."""
+    return StateError(
+        name,
+        f"no set-point for {1e3 * pause:.0f} ms or more, and drives.heartbeat_timeout is "
+        f"{1e3 * config.heartbeat_timeout:.0f} ms",
+        "Check the load of this computer (tautscope doctor) and the line",
+    )

@@ -59,7 +59,8 @@ class DriveMonitor:
         self._config = config
         self._names = names
         self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
-        self._feedback: Sequence[Feedback] = []
+        self._before: list[tuple[float, int]] = []
+        """Position [m or rad] and age of each motor in the last cycle."""
         self._answers = [0] * len(self._scales)
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
         self._last_cycle = 0.0
@@ -82,10 +83,10 @@ class DriveMonitor:
 
     def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
         """Start from motors that are enabled and at rest; their positions (n,) [m or rad]."""
-        self._feedback = feedback
         self._answers = [one.answers for one in feedback]
         self.statistics = self._no_cycles()
         start = self.positions(feedback)
+        self._before = [(at, 0) for at in start]
         self._following.reset(start)
         return start
 
@@ -112,7 +113,7 @@ class DriveMonitor:
             self._check_silence(dof, feedback[dof])
             if fresh[dof]:
                 self._check_position(dof, feedback[dof], positions[dof], bool(exceeded[dof]))
-        self._feedback = feedback
+        self._before = [(at, one.age) for at, one in zip(positions, feedback, strict=True)]
         return positions
 
     def check_start_positions(self, counts: Sequence[int]) -> None:
@@ -155,7 +156,7 @@ class DriveMonitor:
     def _check_position(
         self, dof: Motor, feedback: Feedback, position: float, has_exceeded: bool
     ) -> None:
-        axis, name, before = self._config[dof], self._names[dof], self._feedback[dof]
+        axis, name, (last, age) = self._config[dof], self._names[dof], self._before[dof]
         is_flagged = feedback.reports_following_error
         if has_exceeded or is_flagged:
             following = self._following
@@ -174,8 +175,8 @@ class DriveMonitor:
                 "Check whether something blocks the motor, then drives."
                 f"{dof.label}.counts_per_unit, following_error, following_window and drives.lag",
             )
-        jump = abs(position - self._scales[dof].to_position(before.position))
-        elapsed = (before.age + 2) * self._config.cycle
+        jump = abs(position - last)
+        elapsed = (age + 2) * self._config.cycle
         if jump > 2 * axis.speed_limit * elapsed + axis.following_error:
             raise FollowingError(
                 name, f"its position jumped by {jump:.6g} in a cycle", "Check the encoder cable"

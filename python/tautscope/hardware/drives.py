@@ -12,6 +12,8 @@ failure raises a `DriveError` after the motors have been quick-stopped.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterable, Iterator
 from typing import Self
 
 import numpy as np
@@ -199,6 +201,19 @@ class Drives:
         self._previous = setpoint
         return applied
 
+    def follow(self, commands: Iterable[ArrayLike]) -> Iterator[NDArray[np.float64]]:
+        """Exchange a command in each cycle; the position actual values (n,) [m or rad].
+
+        Raises:
+            DriveError: As `exchange`.
+        """
+        due = time.monotonic()
+        for command in commands:
+            yield self.exchange(command)
+            # After a pause of this process no set-points in a burst.
+            due = max(due + self.cycle, time.monotonic())
+            time.sleep(max(0.0, due - time.monotonic()))
+
     def stop(self) -> None:
         """Quick-stop all motors and wait for confirmation; the bus stays open.
 
@@ -208,9 +223,7 @@ class Drives:
             StateError: A drive does not confirm; use the emergency stop.
         """
         with defer_signals():
-            unconfirmed = self._quick_stop()
-        if unconfirmed:
-            raise _unconfirmed(unconfirmed)
+            _require_confirmed(self._quick_stop())
 
     def disable(self) -> None:
         """`stop`, then disable voltage: nothing holds the motors any more.
@@ -220,9 +233,7 @@ class Drives:
         """
         with defer_signals():
             self._is_running = False
-            unconfirmed = self._group.disable()
-        if unconfirmed:
-            raise _unconfirmed(unconfirmed, "disabling")
+            _require_confirmed(self._group.disable(), "disabling")
 
     def close(self) -> None:
         """`stop`, then release the bus; a second call does nothing.
@@ -235,13 +246,11 @@ class Drives:
                 return
             self._is_closed = True
             try:
-                unconfirmed = self._quick_stop()
+                _require_confirmed(self._quick_stop())
             finally:
                 self._group.close()
                 if self._lock is not None:
                     self._lock.release()
-        if unconfirmed:
-            raise _unconfirmed(unconfirmed)
 
     def __enter__(self) -> Self:
         return self
@@ -257,9 +266,10 @@ class Drives:
     def _stop_after(self, error: BaseException) -> None:
         self._monitor.note_pause()
         with defer_signals():
-            unconfirmed = self._quick_stop()
-        if unconfirmed:
-            error.add_note(str(_unconfirmed(unconfirmed)))
+            try:
+                _require_confirmed(self._quick_stop())
+            except StateError as failed:
+                error.add_note(str(failed))
         if note := self._monitor.pause_note:
             error.add_note(note)
 
@@ -279,9 +289,10 @@ def _as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:
     return vector
 
 
-def _unconfirmed(names: list[str], what: str = "quick stop") -> StateError:
-    return StateError(
-        "; ".join(names),
-        f"{what} is not confirmed",
-        "Use the emergency stop: the motor may be moving",
-    )
+def _require_confirmed(unconfirmed: list[str], what: str = "quick stop") -> None:
+    if unconfirmed:
+        raise StateError(
+            "; ".join(unconfirmed),
+            f"{what} is not confirmed",
+            "Use the emergency stop: the motor may be moving",
+        )

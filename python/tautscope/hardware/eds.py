@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 from tautscope.hardware.object_dictionary import MODES_OF_OPERATION, device_profile
-
-if TYPE_CHECKING:
-    import canopen
 
 _SECTION = re.compile(r"\[\s*([^]]*?)\s*\]")
 _OBJECT = re.compile(r"([0-9a-f]{4})(?:sub([0-9a-f]{1,2}))?")
@@ -24,39 +21,35 @@ _FLOATS = (0x08, 0x11)
 Sections = dict[str, dict[str, str]]
 
 
-def load_eds(path: str | None, node: int) -> canopen.ObjectDictionary:
+class Described(NamedTuple):
+    """What an EDS file tells: CiA 301 data types by index and sub-index, vendor, product number."""
+
+    types: dict[tuple[int, int], int]
+    vendor: int | None = None
+    product: int | None = None
+
+
+def load_eds(path: str | None, node: int) -> Described:
     """The types of objects in an EDS file; without a file, those of `device_profile`.
 
     Raises:
         OSError: The file cannot be read.
         ValueError: The file is not an EDS file of a CiA 402 drive; the message says why.
     """
-    from canopen import ObjectDictionary  # noqa: PLC0415 -- only where a bus is opened
-    from canopen.objectdictionary import ODRecord, ODVariable  # noqa: PLC0415
-
-    sections = None if path is None else _sections(_decoded(Path(path).read_bytes()))
-    dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
-    records: dict[int, ODRecord] = {}
-    for entry in device_profile(node):
-        key = (entry.index, entry.subindex)
-        number = entry.data_type if sections is None else _data_type(sections, key)
-        if number is None:
-            continue
+    profile = {(entry.index, entry.subindex): entry for entry in device_profile(node)}
+    if path is None:
+        return Described({key: entry.data_type for key, entry in profile.items()})
+    sections = _sections(_decoded(Path(path).read_bytes()))
+    found = {key: number for key in profile if (number := _data_type(sections, key)) is not None}
+    for key, number in found.items():
         if number in _FLOATS:
-            raise ValueError(f"{entry} is not an integer: DataType 0x{number:04X}")
-        variable = ODVariable(entry.name, *key)
-        variable.data_type = number
-        record = records.setdefault(entry.index, ODRecord(entry.name, entry.index))
-        record.add_member(variable)
-    for record in records.values():
-        dictionary.add_object(record)
-    if MODES_OF_OPERATION.index not in dictionary:
+            raise ValueError(f"{profile[key]} is not an integer: DataType 0x{number:04X}")
+    if not any(index == MODES_OF_OPERATION.index for index, _ in found):
         raise ValueError(f"it does not describe a CiA 402 drive: no {MODES_OF_OPERATION}")
-    if sections is not None:
-        described = dictionary.device_information
-        described.vendor_number = _number(sections, "deviceinfo", "vendornumber")
-        described.product_number = _number(sections, "deviceinfo", "productnumber")
-    return dictionary
+    vendor, product = (
+        _number(sections, "deviceinfo", key) for key in ("vendornumber", "productnumber")
+    )
+    return Described(found, vendor, product)
 
 
 def _decoded(data: bytes) -> str:

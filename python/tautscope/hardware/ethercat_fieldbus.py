@@ -28,15 +28,13 @@ from tautscope.extras import require_extras
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.fieldbus import (
-    EMPTY_TX_PDO,
+    TX_PDO,
     TX_PDO_OBJECTS,
-    Feedback,
-    TxPdo,
+    Fieldbus,
     abort_error,
-    encoded,
     target_object,
-    verify_setting,
 )
 from tautscope.hardware.object_dictionary import Entry
 
@@ -49,12 +47,12 @@ class _Slave:
 
     name: str
     device: Any
-    tx_pdo: TxPdo = EMPTY_TX_PDO
+    tx_pdo: tuple[int, ...] = (0, 0, 0)
     is_enabled: bool = False
 
 
-class EthercatFieldbus:
-    """Drives on an EtherCAT line; a `tautscope.hardware.fieldbus.Fieldbus`.
+class EthercatFieldbus(Fieldbus):
+    """Drives on an EtherCAT line; a `Fieldbus`.
 
     Args:
         config: `channel` is the network adapter, `node` the position on the line, from 1.
@@ -67,7 +65,10 @@ class EthercatFieldbus:
 
     def __init__(self, config: DrivesConfig, pysoem: Any = None) -> None:
         self._config = config
-        self._soem = _load_library() if pysoem is None else pysoem
+        if pysoem is None:
+            require_extras("EtherCAT", ["ethercat"])
+            import pysoem  # type: ignore[no-redef]  # noqa: PLC0415
+        self._soem = pysoem
         self._master = self._soem.Master()
         self._age = self._answers = 0
         self._answered_at = time.monotonic()
@@ -100,22 +101,6 @@ class EthercatFieldbus:
         """See `Fieldbus.name`."""
         return self._slaves[dof].name
 
-    def read(self, dof: Motor, entry: Entry) -> int:
-        """Read a value by SDO upload; see `Fieldbus.read`."""
-        device = self._slaves[dof].device
-        data = self._request(dof, entry, lambda: device.sdo_read(entry.index, entry.subindex))
-        return entry.decode(bytes(data))
-
-    def write(self, dof: Motor, entry: Entry, value: int) -> None:
-        """Write a value by SDO download; see `Fieldbus.write`."""
-        device = self._slaves[dof].device
-        data = encoded(self.name(dof), entry, value, entry.size)
-        self._request(
-            dof,
-            f"{entry} = {value}",
-            lambda: device.sdo_write(entry.index, entry.subindex, data),
-        )
-
     def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure the mapping and the watchdog of the process data."""
         for dof in self._config.all_motors:
@@ -134,7 +119,7 @@ class EthercatFieldbus:
     def start(self) -> None:
         """Bring the line to operational; process data flows from here on."""
         self._answered_at, self._age = time.monotonic(), 0
-        targets = [self._slaves[dof].tx_pdo.position for dof in self._config.all_motors]
+        targets = [self._slaves[dof].tx_pdo[1] for dof in self._config.all_motors]
         self._exchange([cia402.DISABLE_VOLTAGE] * len(targets), targets)
         self._reach(self._soem.OP_STATE, "operational")
 
@@ -147,7 +132,7 @@ class EthercatFieldbus:
         """
         feedback = self._exchange(controlwords, targets)
         for dof, slave in self._slaves.items():
-            state = cia402.state_of(slave.tx_pdo.statusword)
+            state = cia402.state_of(slave.tx_pdo[0])
             if slave.is_enabled and state in (State.FAULT, State.FAULT_REACTION):
                 slave.is_enabled = False
                 code = self.read(dof, objects.ERROR_CODE)
@@ -199,12 +184,17 @@ class EthercatFieldbus:
             self._age, self._answered_at = 0, now
             self._answers += 1
             for slave in self._slaves.values():
-                slave.tx_pdo = TxPdo.unpack(bytes(slave.device.input))
+                slave.tx_pdo = TX_PDO.unpack_from(bytes(slave.device.input))
         return [
             Feedback(
-                *slave.tx_pdo, age=self._age, answers=self._answers, silence=now - self._answered_at
+                position,
+                self._age,
+                self._answers,
+                silence=now - self._answered_at,
+                statusword=statusword,
+                mode=mode,
             )
-            for slave in self._slaves.values()
+            for statusword, position, mode in (slave.tx_pdo for slave in self._slaves.values())
         ]
 
     def _reach(self, state: int, name: str) -> None:
@@ -240,7 +230,17 @@ class EthercatFieldbus:
         self.write(dof, count, len(entries))
         self.write(dof, Entry(assignment, 1, "assigned PDO", 2), mapping)
         self.write(dof, pdos, 1)
-        verify_setting(self, dof, count, len(entries))
+        self.verify(dof, count, len(entries))
+
+    def _upload(self, dof: Motor, entry: Entry) -> bytes:
+        device = self._slaves[dof].device
+        return bytes(
+            self._request(dof, entry, lambda: device.sdo_read(entry.index, entry.subindex))
+        )
+
+    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
+        device = self._slaves[dof].device
+        self._request(dof, what, lambda: device.sdo_write(entry.index, entry.subindex, data))
 
     def _request(self, dof: Motor, what: object, transfer: Callable[[], Any]) -> Any:
         name = self.name(dof)
@@ -254,10 +254,3 @@ class EthercatFieldbus:
                 f"no answer to an SDO request for {what} ({error})",
                 "Check its supply and cables",
             ) from None
-
-
-def _load_library() -> Any:
-    require_extras("EtherCAT", ["ethercat"])
-    import pysoem  # noqa: PLC0415
-
-    return pysoem

@@ -55,7 +55,10 @@ def run_on_hardware(
     if reference is None:
         check_experiment(config)
     rig = make_rig(config)  # an invalid configuration must leave no folder behind
-    _make_folder(check_free(folder))
+    try:
+        check_free(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError("out", str(folder), f"a place that can be written ({error})") from None
     runs = []
     with exit_on_signals(), realtime_process(OTHERS):
         for index, compensate in enumerate(kinds):
@@ -134,10 +137,3 @@ def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
     except TautscopeError as error:
         stop.add_note(str(error))
     raise stop
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError("out", str(folder), f"a place that can be written ({error})") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,18 +49,11 @@ def jog(config: DrivesConfig, dof: Motor, distance: float) -> tuple[float, float
         DriveError: A drive is missing, differs from its configuration, or failed.
     """
     check_distance(dof, distance)
-    steps = round(DURATION / config.cycle)
     with exit_on_signals(), open_drives(config) as drives:
         begin = drives.start()
-        applied, due = [begin], time.monotonic()
+        commands = [command for _, command in _out_and_back(begin, dof, distance, config.cycle)]
         try:
-            for step in range(steps + 1):
-                command = begin.copy()
-                command[dof] += distance * _displacement(step / steps)
-                applied.append(drives.exchange(command))
-                # After a pause of this process no set-points in a burst.
-                due = max(due + config.cycle, time.monotonic())
-                time.sleep(max(0.0, due - time.monotonic()))
+            applied = [begin, *drives.follow(commands)]
         except TautscopeError as error:
             error.exit_status = STOPPED
             raise
@@ -115,16 +108,13 @@ def jog_rig(
         if not low <= begin[index] + distance <= high:
             allowed = f"within range {[low, high]}: {dof.name} is at {begin[index]:.4g}"
             raise FieldError("distance", distance, allowed)
-        steps = round(DURATION / config.control.period)
         applied: list[float] = []
         measured: dict[int, list[tuple[float, Measurement]]] = {}
-        for step in range(steps + 1):
-            command = begin.copy()
-            command[index] += distance * _displacement(step / steps)
+        for share, command in _out_and_back(begin, index, distance, config.control.period):
             sample = check_sample(rig.step(command), config)
             applied.append(sample.applied[index] - begin[index])
             for each in sample.measurements:
-                measured.setdefault(each.sensor, []).append((step / steps, each))
+                measured.setdefault(each.sensor, []).append((share, each))
     largest = max(applied, key=abs)
     seen = [_seen(sensor, own, config, index) for sensor, own in sorted(measured.items())]
     return float(largest), float(applied[-1]), [each for each in seen if each is not None]
@@ -154,7 +144,13 @@ def _seen(
     return SensorMotion(sensor, "points", moved, ended, "px", 1.0)
 
 
-def _displacement(share: float) -> float:
-    """Displacement at a share of the motion: raised cosines from 0 to 1 and back, with `_RESTS`."""
-    phase = np.interp(share, np.ravel(_RESTS), (0.0, 0.0, 0.5, 0.5, 1.0, 1.0))
-    return float((1 - np.cos(2 * np.pi * phase)) / 2)
+def _out_and_back(
+    begin: NDArray[np.float64], index: int, distance: float, period: float
+) -> Iterator[tuple[float, NDArray[np.float64]]]:
+    """Share of the motion and command: raised cosines to a distance and back, with `_RESTS`."""
+    steps = round(DURATION / period)
+    for step in range(steps + 1):
+        phase = np.interp(step / steps, np.ravel(_RESTS), (0.0, 0.0, 0.5, 0.5, 1.0, 1.0))
+        command = begin.copy()
+        command[index] += distance * (1 - np.cos(2 * np.pi * phase)) / 2
+        yield step / steps, command

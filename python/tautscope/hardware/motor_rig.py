@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
@@ -13,15 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config, DrivesConfig
 from tautscope.errors import ConfigError, SignalError
-from tautscope.hardware.drives import open_drives
+from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.realtime import LOOP, realtime, short_switch_interval
-from tautscope.hardware.setpoint_thread import Motors, SetpointThread
+from tautscope.hardware.setpoint_thread import SetpointThread
 from tautscope.hardware.timing import Timing
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.rig import Sample
 
 _LOG = logging.getLogger(__name__)
+_WATCH_PERIOD = 0.005
+"""Time between two calls of `must_stop` [s]."""
 
 
 class MotorRig:
@@ -48,24 +51,19 @@ class MotorRig:
 
     Args:
         config: With a section ``drives``.
-        motors: Opens the drives.
+
+    Attributes:
+        timing: Timing of the set-points and frames since `reset`.
         warn: Called once when a problem begins that does not stop the run, and when it ends.
 
     Raises:
         ConfigError: The section ``drives`` is missing, or ``control.period`` is not its cycle.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        *,
-        motors: Callable[[DrivesConfig], Motors] = open_drives,
-        warn: Callable[[str], None] = _LOG.warning,
-    ) -> None:
+    def __init__(self, config: Config) -> None:
         self._drives = require_drives(config)
         self._config = config
-        self._open_motors = motors
-        self.warn = warn
+        self.warn: Callable[[str], None] = _LOG.warning
         self.timing = Timing(self._drives.cycle)
         self._resources = ExitStack()
         self._setpoints: SetpointThread | None = None
@@ -113,7 +111,7 @@ class MotorRig:
         try:
             self._open_sensors(self._resources)
             self._setpoints = SetpointThread(
-                self._drives, lambda: self._open_motors(self._drives), self.start, self.timing
+                self._drives, self._open_motors, self.start, self.timing
             )
             self._resources.callback(self._setpoints.stop)
             applied = self._setpoints.start()
@@ -128,6 +126,26 @@ class MotorRig:
         self._sent.clear()
         self._ticks = 0
         return Sample(0.0, applied)
+
+    def reset_unless(self, must_stop: Callable[[], bool]) -> Sample:
+        """`reset`, which takes seconds; the motors are quick-stopped once `must_stop` is true.
+
+        It is called periodically in another thread; `reset` then raises `StateError`.
+        """
+        is_over = threading.Event()
+
+        def watch() -> None:
+            while not is_over.wait(_WATCH_PERIOD):
+                if must_stop():
+                    self.interrupt()
+
+        thread = threading.Thread(target=watch, name="opening")
+        thread.start()
+        try:
+            return self.reset()
+        finally:
+            is_over.set()
+            thread.join()
 
     def step(self, command: ArrayLike) -> Sample:
         """Send command (m,) [m or rad] in the next cycle; return when the drives answer.
@@ -184,6 +202,9 @@ class MotorRig:
         index = bisect_right(self._sent, (instant, float("inf"))) - 1
         sent, at = self._sent[max(index, 0)]
         return at + min(instant - sent, self.control_period)
+
+    def _open_motors(self) -> Drives:
+        return open_drives(self._drives)
 
     def _open_sensors(self, resources: ExitStack) -> None:
         """Open what measures, before the motors are enabled."""

@@ -14,6 +14,8 @@ SIGNED = {1: 0x02, 2: 0x03, 4: 0x04}
 """CiA 301 data type by length in bytes: INTEGER8, INTEGER16, INTEGER32."""
 UNSIGNED = {1: 0x05, 2: 0x06, 4: 0x07}
 """CiA 301 data type by length in bytes: UNSIGNED8, UNSIGNED16, UNSIGNED32."""
+SIZES = {number: size for types in (SIGNED, UNSIGNED) for size, number in types.items()}
+"""Length in bytes by CiA 301 data type."""
 
 
 @dataclass(frozen=True, slots=True)

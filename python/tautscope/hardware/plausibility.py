@@ -116,19 +116,13 @@ class PlausibilityMonitor:
         Raises:
             ConfigError: A tip moves against its motor, too far, or not at all.
         """
-        motor = self._motors_at(captured_at)
+        past = (applied for at, applied in reversed(self._applied) if at <= captured_at)
+        motor = next(past, self._applied[0][1] if self._applied else self._last)
         for dof in Dof:
             if report.observable[dof]:
                 self._unmeasured_travel[dof] = 0.0
                 if not self._has_passed[dof]:
                     self._check(dof, (float(motor[dof]), float(report.state_estimate[dof])))
-
-    def _motors_at(self, time: float) -> NDArray[np.float64]:
-        """Motor positions (3,) [m, rad, rad] at a time in the past."""
-        for at, applied in reversed(self._applied):
-            if at <= time:
-                return applied
-        return self._applied[0][1] if self._applied else self._last
 
     def _check(self, dof: Dof, now: tuple[float, float]) -> None:
         least, largest = self._ends[dof] or (now, now)

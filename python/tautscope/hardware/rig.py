@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
-from typing import Protocol
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import Config, DrivesConfig
+from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, CameraState, Capture
-from tautscope.hardware.drives import open_drives
 from tautscope.hardware.motor_rig import MotorRig
-from tautscope.hardware.setpoint_thread import Motors
 from tautscope.loop.rig import Frame, Sample
 
 _LOG = logging.getLogger(__name__)
-
-
-class FrameSource(AbstractContextManager["FrameSource"], Protocol):
-    """The part of `tautscope.hardware.cameras.Camera` that the rig uses."""
-
-    @property
-    def state(self) -> CameraState:
-        """State of the camera."""
-        ...
-
-    def newest(self) -> Capture | None:
-        """The newest frame not taken before, with times of the monotonic clock; else None."""
-        ...
 
 
 class HardwareRig(MotorRig):
@@ -41,25 +24,14 @@ class HardwareRig(MotorRig):
 
     Args:
         config: With a section ``drives``; a run starts at the centres of ``experiment``.
-        motors: Opens the drives.
-        camera: Opens the camera.
-        warn: As of `MotorRig`.
 
     Raises:
         ConfigError: As of `MotorRig`.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        *,
-        motors: Callable[[DrivesConfig], Motors] = open_drives,
-        camera: Callable[[Config], FrameSource] | None = None,
-        warn: Callable[[str], None] = _LOG.warning,
-    ) -> None:
-        super().__init__(config, motors=motors, warn=warn)
-        self._open_camera = camera or (lambda config: Camera(config.camera, time.monotonic))
-        self._camera: FrameSource | None = None
+    def __init__(self, config: Config) -> None:
+        super().__init__(config)
+        self._camera: Camera | None = None
         self._last_capture: Capture | None = None
         self._new_frame_at = 0.0
         self._trouble = ""
@@ -82,8 +54,11 @@ class HardwareRig(MotorRig):
         self._new_frame_at = time.monotonic()
         return sample
 
+    def _open_camera(self) -> Camera:
+        return Camera(self._config.camera, time.monotonic)
+
     def _open_sensors(self, resources: ExitStack) -> None:
-        self._camera = resources.enter_context(self._open_camera(self._config))
+        self._camera = resources.enter_context(self._open_camera())
         _LOG.info("camera %s: frames arrive", self._config.camera.source.url)
 
     def _sample(self, time: float, applied: NDArray[np.float64]) -> Sample:
@@ -95,7 +70,7 @@ class HardwareRig(MotorRig):
         assert self._camera is not None
         return Sample(time, applied, self._newest_frame(self._camera))
 
-    def _newest_frame(self, camera: FrameSource) -> Frame | None:
+    def _newest_frame(self, camera: Camera) -> Frame | None:
         """The newest frame on the rig's clock; None if it repeats the last image."""
         now = time.monotonic()
         capture = camera.newest()

@@ -6,37 +6,20 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import StateError
 from tautscope.hardware.drive_monitor import outside_travel
+from tautscope.hardware.drives import Drives
 from tautscope.hardware.realtime import SETPOINTS, realtime
 from tautscope.hardware.timing import Timing
 
 Floats = NDArray[np.float64]
 _COMMAND_WAIT = 0.3
 """How long a cycle waits for a late command [fraction of the cycle]."""
-
-
-class Motors(AbstractContextManager["Motors"], Protocol):
-    """The part of `tautscope.hardware.drives.Drives` that this thread uses."""
-
-    def start(self) -> Floats:
-        """Enable the motors; their positions (n,) [m or rad]."""
-        ...
-
-    def exchange(self, command: ArrayLike) -> Floats:
-        """Send a set-point (n,) and read the positions (n,) [m or rad]."""
-        ...
-
-    def disable(self) -> None:
-        """Quick-stop, then disable voltage."""
-        ...
 
 
 class SetpointThread:
@@ -57,7 +40,7 @@ class SetpointThread:
     def __init__(
         self,
         config: DrivesConfig,
-        motors: Callable[[], Motors],
+        motors: Callable[[], Drives],
         start: Floats | None,
         timing: Timing,
     ) -> None:
@@ -150,7 +133,7 @@ class SetpointThread:
             self._failure, self._is_over = failure, True
             self._condition.notify_all()
 
-    def _move_to_start(self, motors: Motors, position: Floats) -> None:
+    def _move_to_start(self, motors: Drives, position: Floats) -> None:
         """Move along half a cosine to the start, at `start_speed` of the speed limits at most."""
         config = self._config
         for dof in self._config.all_motors:
@@ -178,7 +161,7 @@ class SetpointThread:
             self._sent = self._due, applied
             self._condition.notify_all()
 
-    def _stream(self, motors: Motors) -> None:
+    def _stream(self, motors: Drives) -> None:
         assert self._start is not None
         command, last_command_at = self._start, time.monotonic()
         while not self._must_stop():

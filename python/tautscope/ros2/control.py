@@ -14,8 +14,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
-from tautscope.console.paced_rig import PacedRig
-from tautscope.errors import MessageError, TautscopeError
+from tautscope.errors import ConfigError, MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
@@ -25,18 +24,21 @@ from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
+from tautscope.ros2.driver import DriverRig
+from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
-from tautscope.ros2.opening import reset_rig
-from tautscope.ros2.parameters import Parameter, Parameters
-from tautscope.ros2.references import Pausable, Source
+from tautscope.ros2.parameters import Parameters
+from tautscope.ros2.references import JoyReference, ServoReference
 from tautscope.ros2.sensors import Sensors
 from tautscope.ros2.session import Node
-from tautscope.ros2.telemetry import Telemetry, Topics
+from tautscope.ros2.telemetry import Telemetry
 from tautscope.ros2.wire import Qos
 
 _LOG = logging.getLogger(__name__)
 _IDLE_PERIOD = 0.005
 """Time between two checks for requests while no loop runs [s]."""
+MakeRig = Callable[[Config], Rig]
+"""Makes the rig that the loop commands."""
 
 
 class NodeControl:
@@ -45,51 +47,63 @@ class NodeControl:
     Args:
         config: Of the loop.
         node: The node.
-        topics: Names of the topics.
-        telemetry: Publishes.
-        source: The operator's reference.
-        sensors: Of the tip, in ROS.
-        make_rig: Makes the rig; called by the transition ``configure``.
         folder: For logs.
         executor: Runs the marker detection.
         clock: The clocks.
+        make_rig: Makes the rig, in the transition ``configure``; None for a driver in ROS.
+        device: Topic of the reference, ``servo_jp`` or ``joy``.
+        layout: Axes and button of a gamepad.
         on_result: Called at the end of a run with a line about what the compensation achieved.
 
     Attributes:
         run: The present run; None if the node is not active.
         fault: Why the last run ended, if no request ended it.
+
+    Raises:
+        ConfigError: Without a rig of its own nothing would measure the tip.
     """
 
     def __init__(
         self,
         config: Config,
         node: Node,
-        topics: Topics,
-        telemetry: Telemetry,
-        *,
-        source: Source,
-        sensors: Sensors,
-        make_rig: Callable[[Config], Rig],
         folder: Path,
         executor: Executor,
         clock: Clock,
+        *,
+        make_rig: MakeRig | None,
+        device: str,
+        layout: JoyAxes,
         on_result: Callable[[str], None] = lambda _: None,
     ) -> None:
+        if config.dof and make_rig is None and not config.measurement.topics:
+            raise ConfigError("measurement.topics", None, "a topic that measures the tip")
         self._config, self._folder, self._executor = config, folder, executor
-        self._telemetry, self._make_rig = telemetry, make_rig
-        self._states = StateMachine()
-        self._source, self._sensors = Pausable(source, self._states), sensors
         self._on_result, self._achieved = on_result, Achieved(config)
+        self._telemetry = Telemetry(config, node, clock, has_rig=make_rig is not None)
+        refuse, self._states = self._telemetry.refuse, StateMachine()
+        joints = [dof.label for dof in config.dofs]
+        self._source = (
+            JoyReference(config, node, layout, clock=clock, refuse=refuse, states=self._states)
+            if device == "joy"
+            else ServoReference(node, joints, clock, refuse, self._states)
+        )
+        self._sensors = Sensors(config, node, clock, refuse)
+        if make_rig is None:
+            driver = DriverRig(config, node, clock, refuse)
+            make_rig = lambda _: driver  # noqa: E731
+        self._make_rig = make_rig
         self._rig: Rig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
         self._is_disabling = False
         self._runs = 0
+        self._node = node
         self._commands = node.subscription(
-            topics.state_command, "crtk_msgs/msg/StringStamped", Qos(depth=10)
+            "instrument/state_command", "crtk_msgs/msg/StringStamped", Qos(depth=10)
         )
         self.lifecycle = Lifecycle(node, self._change)
-        self.parameters = Parameters(node, clock, self._declared())
+        self.parameters = Parameters(node, clock, config, self._set_compensation)
 
     def main(self) -> None:
         """Run until the node is finalized."""
@@ -104,8 +118,7 @@ class NodeControl:
         """Execute the requests that wait, and publish the state if it is due."""
         while (command := self._take_command()) is not None:
             self._execute(command)
-        self.lifecycle.serve()
-        self.parameters.serve()
+        self._node.serve()
         self._publish_state()
         self._telemetry.diagnose(self.run, self.operating_state, self.fault)
 
@@ -142,24 +155,9 @@ class NodeControl:
         try:
             self._end_run()
         finally:
-            rig, self._rig = self._rig, None
             self._publish_state()
             self._telemetry.close()
-            if rig is not None:
-                rig.close()
-
-    def _declared(self) -> dict[str, Parameter]:
-        config = self._config
-        return {
-            "compensation": Parameter(
-                1.0, "share of the compensation, 0 to 1", (0.0, 1.0), self._set_compensation
-            ),
-            "control.period": Parameter(config.control.period, "control period [s]"),
-            "profile": Parameter(config.profile, "how slack is compensated"),
-            "safety.reference_age": Parameter(
-                config.safety.reference_age, "age of a reference that stops motion [s]"
-            ),
-        }
+            self._release_rig()
 
     def _set_compensation(self, share: float) -> None:
         if self.run is not None:
@@ -201,18 +199,24 @@ class NodeControl:
             else:
                 self._end_run()
                 if transition.goal in (State.UNCONFIGURED, State.FINALIZED):
-                    rig, self._rig = self._rig, None
-                    if rig is not None:
-                        rig.close()
+                    self._release_rig()
         except TautscopeError as error:
             self.fault, self._states.goal = str(error), OperatingState.FAULT
             _LOG.warning("%s", error)
             self._telemetry.warn(str(error))
-            if transition is ACTIVATE and isinstance(self._rig, HardwareRig | PacedRig):
+            if transition is ACTIVATE and self._rig is not None:
                 self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.
             return transition not in (CONFIGURE, ACTIVATE)
         return True
+
+    def _is_stopped(self) -> bool:
+        return self._take_command() in ("disable", "pause")
+
+    def _release_rig(self) -> None:
+        rig, self._rig = self._rig, None
+        if rig is not None:
+            rig.close()
 
     def _start_run(self) -> None:
         """Enable the rig and start the loop at rest, where the instrument is."""
@@ -221,12 +225,15 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
-        sample = reset_rig(rig, lambda: self._take_command() in ("disable", "pause"))
+        if isinstance(rig, HardwareRig):
+            sample = rig.reset_unless(self._is_stopped)
+            monitor = partial(PlausibilityMonitor, self._config)
+        else:
+            sample, monitor = rig.reset(), None
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
         self._achieved = Achieved(self._config)
-        is_hardware = isinstance(rig, HardwareRig)
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
             run = ControlRun(
@@ -236,7 +243,7 @@ class NodeControl:
                 self._source,
                 path=self._folder / f"ros2-{self._runs}.mcap",
                 executor=self._executor,
-                monitor=partial(PlausibilityMonitor, self._config) if is_hardware else None,
+                monitor=monitor,
             )
         if not self._config.dof:
             # The detector is made and used now, because its first use is slow.
@@ -261,11 +268,10 @@ class NodeControl:
         if not self.fault:
             self._states.goal = OperatingState.DISABLED
         try:
-            rig = self._rig
-            if isinstance(rig, HardwareRig) and self._is_disabling:
-                rig.disable()
-            elif isinstance(rig, HardwareRig | PacedRig):
-                rig.close()
+            if isinstance(self._rig, HardwareRig) and self._is_disabling:
+                self._rig.disable()
+            elif self._rig is not None:
+                self._rig.close()
         finally:
             self._publish_state()
             try:

@@ -35,29 +35,18 @@ class DriverRig:
     Args:
         config: With the degrees of freedom; without [[dof]] with the camera's size and format.
         node: Publishes and subscribes.
-        instrument: Namespace of the topics of the drives.
-        image: Topic of the images.
         clock: The clocks.
         refuse: Called for refused messages.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        node: Node,
-        *,
-        instrument: str,
-        image: str,
-        clock: Clock,
-        refuse: Refuse,
-    ) -> None:
+    def __init__(self, config: Config, node: Node, clock: Clock, refuse: Refuse) -> None:
         kind = "sensor_msgs/msg/JointState"
-        self._setpoints = node.publisher(f"{instrument}/actuators/setpoint_js", kind)
-        self._positions = node.subscription(f"{instrument}/actuators/measured_js", kind)
+        self._setpoints = node.publisher("instrument/actuators/setpoint_js", kind)
+        self._positions = node.subscription("instrument/actuators/measured_js", kind)
         self._position_stamps = Stamps(self._positions.topic)
         self._images: Subscription | None = None
         if not config.dof:
-            self._images = node.subscription(image, IMAGE, SENSOR_DATA)
+            self._images = node.subscription("endoscope/image_raw", IMAGE, SENSOR_DATA)
             self._image_stamps = Stamps(self._images.topic)
             self._reader = ImageReader(self._images.topic, config.camera)
         self._joints = [dof.label for dof in config.dofs]

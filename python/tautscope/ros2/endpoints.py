@@ -16,6 +16,8 @@ from tautscope.ros2 import types, wire
 IMAGE = "sensor_msgs/msg/Image"
 LARGEST = 2**16
 """Longest message that is decoded, but for images [byte]: a tick must not wait for a longer one."""
+Handler = Callable[[Any], dict[str, Any]]
+"""Makes the fields of the response to a request."""
 LARGEST_IMAGE = 2**26
 """Longest image that is decoded [byte]."""
 
@@ -87,9 +89,7 @@ class Subscription:
 class Service:
     """Requests to a service; made by `Node.service`."""
 
-    def __init__(
-        self, kind: str, queryable: Any, token: Any, handler: Callable[[Any], Any]
-    ) -> None:
+    def __init__(self, kind: str, queryable: Any, token: Any, handler: Handler) -> None:
         self._kind, self._queryable, self._token = kind, queryable, token
         self._handler = handler
 
@@ -105,12 +105,12 @@ class Service:
                 raise MessageError(self._kind, None, "a request with an attachment")
             sequence, _, source = wire.read_attachment(_payload(query.attachment, LARGEST))
             request = types.decode(f"{self._kind}_Request", _payload(query.payload, LARGEST))
-            response = types.encode(self._handler(request))
+            response = types.make(f"{self._kind}_Response", **self._handler(request))
         except MessageError as error:
             query.reply_err(str(error).encode())
             return
         attachment = wire.attachment(sequence, time.time_ns(), source)
-        query.reply(query.key_expr, response, attachment=attachment)
+        query.reply(query.key_expr, types.encode(response), attachment=attachment)
 
 
 def _payload(data: Any, largest: int) -> bytes:

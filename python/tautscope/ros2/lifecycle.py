@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 from tautscope.ros2 import types
-from tautscope.ros2.endpoints import Publisher, Service
 from tautscope.ros2.session import Node
 
 
@@ -64,43 +63,31 @@ class Lifecycle:
     def __init__(self, node: Node, change: Change) -> None:
         self.state = State.UNCONFIGURED
         self._change = change
-        self._events: Publisher = node.publisher(
-            "~/transition_event", "lifecycle_msgs/msg/TransitionEvent"
-        )
-        handlers = {
-            "change_state": ("ChangeState", self._change_state),
-            "get_state": ("GetState", self._get_state),
-            "get_available_states": ("GetAvailableStates", self._get_states),
-            "get_available_transitions": ("GetAvailableTransitions", self._get_transitions),
-            "get_transition_graph": ("GetAvailableTransitions", self._get_graph),
-        }
-        self._services: list[Service] = [
-            node.service(f"~/{name}", f"lifecycle_msgs/srv/{kind}", handler)
-            for name, (kind, handler) in handlers.items()
-        ]
-
-    def serve(self) -> None:
-        """Answer requests."""
-        for service in self._services:
-            service.serve()
+        self._events = node.publisher("~/transition_event", "lifecycle_msgs/msg/TransitionEvent")
+        states = {"available_states": [_state(state) for state in State]}
+        for name, kind, handler in (
+            ("change_state", "ChangeState", self._change_state),
+            ("get_state", "GetState", lambda _: {"current_state": _state(self.state)}),
+            ("get_available_states", "GetAvailableStates", lambda _: states),
+            ("get_available_transitions", "GetAvailableTransitions", self._get_transitions),
+            (
+                "get_transition_graph",
+                "GetAvailableTransitions",
+                lambda _: _descriptions(list(State)),
+            ),
+        ):
+            node.add_service(f"~/{name}", f"lifecycle_msgs/srv/{kind}", handler)
 
     def trigger(self, transition: Transition) -> bool:
         """Carry a transition out, if the node is in its start state; whether it succeeded."""
         if self.state is not transition.start or not self._change(transition):
             return False
         self.state = transition.goal
-        self._events.publish(
-            types.make(
-                "lifecycle_msgs/msg/TransitionEvent",
-                timestamp=0,
-                transition=_transition(transition),
-                start_state=_state(transition.start),
-                goal_state=_state(transition.goal),
-            )
-        )
+        event = types.make("lifecycle_msgs/msg/TransitionEvent", **_description(transition))
+        self._events.publish(event)
         return True
 
-    def _change_state(self, request: Any) -> Any:
+    def _change_state(self, request: Any) -> dict[str, Any]:
         asked = request.transition
         # As in rclcpp_lifecycle, a label has priority over the number.
         found = [
@@ -109,43 +96,25 @@ class Lifecycle:
             if each.start is self.state
             and (each.label == asked.label if asked.label else each.number == asked.id)
         ]
-        success = bool(found) and self.trigger(found[0])
-        return types.make("lifecycle_msgs/srv/ChangeState_Response", success=success)
+        return {"success": bool(found) and self.trigger(found[0])}
 
-    def _get_state(self, request: Any) -> Any:
-        return types.make("lifecycle_msgs/srv/GetState_Response", current_state=_state(self.state))
-
-    def _get_states(self, request: Any) -> Any:
-        return types.make(
-            "lifecycle_msgs/srv/GetAvailableStates_Response",
-            available_states=[_state(state) for state in State],
-        )
-
-    def _get_transitions(self, request: Any) -> Any:
-        return _descriptions(each for each in TRANSITIONS if each.start is self.state)
-
-    def _get_graph(self, request: Any) -> Any:
-        return _descriptions(TRANSITIONS)
+    def _get_transitions(self, _: Any) -> dict[str, Any]:
+        return _descriptions([self.state])
 
 
-def _descriptions(transitions: Any) -> Any:
-    return types.make(
-        "lifecycle_msgs/srv/GetAvailableTransitions_Response",
-        available_transitions=[
-            types.make(
-                "lifecycle_msgs/msg/TransitionDescription",
-                transition=_transition(each),
-                start_state=_state(each.start),
-                goal_state=_state(each.goal),
-            )
-            for each in transitions
-        ],
-    )
+def _descriptions(starts: Container[State]) -> dict[str, Any]:
+    """The transitions from some states."""
+    found = [_description(each) for each in TRANSITIONS if each.start in starts]
+    return {"available_transitions": found}
 
 
-def _state(state: State) -> Any:
-    return types.make("lifecycle_msgs/msg/State", id=int(state), label=state.label)
+def _description(transition: Transition) -> dict[str, Any]:
+    return {
+        "transition": {"id": transition.number, "label": transition.label},
+        "start_state": _state(transition.start),
+        "goal_state": _state(transition.goal),
+    }
 
 
-def _transition(transition: Transition) -> Any:
-    return types.make("lifecycle_msgs/msg/Transition", id=transition.number, label=transition.label)
+def _state(state: State) -> dict[str, Any]:
+    return {"id": int(state), "label": state.label}

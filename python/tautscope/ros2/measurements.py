@@ -48,7 +48,11 @@ class MeasurementReader:
         if self._settings.type == "JointState":
             values = known_positions(topic, message, self._joints)
             return None if np.isnan(values).all() else Tip(values, captured_at, None, self._sensor)
-        self._check_frame(message.header.frame_id)
+        frame = message.header.frame_id
+        self._frame = self._frame or frame
+        if frame != self._frame:
+            allowed = f"{self._frame!r}, in which the kinematics gives the tip"
+            raise MessageError(f"{topic} header.frame_id", frame[:64], allowed)
         if self._settings.type == "PointStamped":
             return self._pose("point", message.point, None, captured_at)
         covariance = None
@@ -60,12 +64,6 @@ class MeasurementReader:
         read = partial(self._pose, f"{field}.position", pose.position, turned, captured_at)
         # All zeros mark an unknown covariance.
         return read() if covariance is None or not covariance.any() else read(covariance)
-
-    def _check_frame(self, frame: str) -> None:
-        self._frame = self._frame or frame
-        if frame != self._frame:
-            allowed = f"{self._frame!r}, in which the kinematics gives the tip"
-            raise MessageError(f"{self._topic} header.frame_id", frame[:64], allowed)
 
     def _rotation(self, field: str, quaternion: Any) -> Floats | None:
         """Rotation matrix (3, 3) of a quaternion; None where it is all NaN."""

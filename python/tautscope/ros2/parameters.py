@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from tautscope.config import Config
 from tautscope.ros2 import types
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.session import Node
 
-_NOT_SET, _BOOL, _INTEGER, _DOUBLE, _STRING = range(5)
-_TYPES = {bool: _BOOL, int: _INTEGER, float: _DOUBLE, str: _STRING}
-"""Types of rcl_interfaces/msg/ParameterType."""
-_FIELDS = {
-    _BOOL: "bool_value",
-    _INTEGER: "integer_value",
-    _DOUBLE: "double_value",
-    _STRING: "string_value",
-}
-Value = bool | int | float | str
+_DOUBLE = 3
+_TYPES = {float: (_DOUBLE, "double_value"), str: (4, "string_value")}
+"""Type -> number of rcl_interfaces/msg/ParameterType, field of ParameterValue."""
+Value = float | str
 
 
 @dataclass(slots=True)
@@ -47,45 +40,43 @@ class Parameters:
     Args:
         node: Has the services.
         clock: For the stamps of events.
-        parameters: Name -> parameter.
+        config: Settings that can be read.
+        set_compensation: Sets the share of the compensation.
     """
 
-    def __init__(self, node: Node, clock: Clock, parameters: Mapping[str, Parameter]) -> None:
-        self._parameters = dict(parameters)
+    def __init__(
+        self, node: Node, clock: Clock, config: Config, set_compensation: Callable[[float], None]
+    ) -> None:
+        share = "share of the compensation, 0 to 1"
+        age = "age of a reference that stops motion [s]"
+        self._parameters = {
+            "compensation": Parameter(1.0, share, (0.0, 1.0), set_compensation),
+            "control.period": Parameter(config.control.period, "control period [s]"),
+            "profile": Parameter(config.profile, "how slack is compensated"),
+            "safety.reference_age": Parameter(config.safety.reference_age, age),
+        }
         self._clock, self._path = clock, node.identity.path
         self._events = node.publisher("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
-        handlers = {
-            "get_parameters": ("GetParameters", self._get),
-            "get_parameter_types": ("GetParameterTypes", self._get_types),
-            "list_parameters": ("ListParameters", self._list),
-            "describe_parameters": ("DescribeParameters", self._describe),
-            "set_parameters": ("SetParameters", self._set),
-            "set_parameters_atomically": ("SetParametersAtomically", self._set_atomically),
-        }
-        self._services = [
-            node.service(f"~/{name}", f"rcl_interfaces/srv/{kind}", handler)
-            for name, (kind, handler) in handlers.items()
-        ]
+        for name, kind, handler in (
+            ("get_parameters", "GetParameters", self._get),
+            ("get_parameter_types", "GetParameterTypes", self._get_types),
+            ("list_parameters", "ListParameters", self._list),
+            ("describe_parameters", "DescribeParameters", self._describe),
+            ("set_parameters", "SetParameters", self._set),
+            ("set_parameters_atomically", "SetParametersAtomically", self._set_atomically),
+        ):
+            node.add_service(f"~/{name}", f"rcl_interfaces/srv/{kind}", handler)
 
     def __getitem__(self, name: str) -> Value:
         return self._parameters[name].value
 
-    def serve(self) -> None:
-        """Answer requests."""
-        for service in self._services:
-            service.serve()
+    def _get(self, request: Any) -> dict[str, Any]:
+        return {"values": [self._value(name) for name in request.names]}
 
-    def _get(self, request: Any) -> Any:
-        values = [_value(self._value(name)) for name in request.names]
-        return types.make("rcl_interfaces/srv/GetParameters_Response", values=values)
+    def _get_types(self, request: Any) -> dict[str, Any]:
+        return {"types": [self._value(name).get("type", 0) for name in request.names]}
 
-    def _get_types(self, request: Any) -> Any:
-        kinds = [_type(self._value(name)) for name in request.names]
-        return types.make(
-            "rcl_interfaces/srv/GetParameterTypes_Response", types=np.array(kinds, np.uint8)
-        )
-
-    def _list(self, request: Any) -> Any:
+    def _list(self, request: Any) -> dict[str, Any]:
         names = [
             name
             for name in self._parameters
@@ -93,32 +84,25 @@ class Parameters:
             or any(name == prefix or name.startswith(f"{prefix}.") for prefix in request.prefixes)
         ]
         prefixes = sorted({name.rpartition(".")[0] for name in names if "." in name})
-        result = types.make(
-            "rcl_interfaces/msg/ListParametersResult", names=names, prefixes=prefixes
-        )
-        return types.make("rcl_interfaces/srv/ListParameters_Response", result=result)
+        return {"result": {"names": names, "prefixes": prefixes}}
 
-    def _describe(self, request: Any) -> Any:
-        descriptors = [self._descriptor(name) for name in request.names]
-        return types.make("rcl_interfaces/srv/DescribeParameters_Response", descriptors=descriptors)
+    def _describe(self, request: Any) -> dict[str, Any]:
+        return {"descriptors": [self._descriptor(name) for name in request.names]}
 
-    def _set(self, request: Any) -> Any:
+    def _set(self, request: Any) -> dict[str, Any]:
         results = []
         for asked in request.parameters:
             reason = self._refusal(asked)
             if not reason:
                 self._apply([asked])
-            results.append(_result(reason))
-        return types.make("rcl_interfaces/srv/SetParameters_Response", results=results)
+            results.append({"successful": not reason, "reason": reason})
+        return {"results": results}
 
-    def _set_atomically(self, request: Any) -> Any:
+    def _set_atomically(self, request: Any) -> dict[str, Any]:
         reasons = [reason for each in request.parameters if (reason := self._refusal(each))]
         if not reasons:
             self._apply(request.parameters)
-        return types.make(
-            "rcl_interfaces/srv/SetParametersAtomically_Response",
-            result=_result("; ".join(reasons)),
-        )
+        return {"result": {"successful": not reasons, "reason": "; ".join(reasons)}}
 
     def _refusal(self, asked: Any) -> str:
         """Why a value cannot be set; empty if it can."""
@@ -127,10 +111,9 @@ class Parameters:
             return f"{asked.name[:64]}: no such parameter"
         if parameter.set is None or parameter.range is None:
             return f"{asked.name}: can only be read"
-        value = getattr(asked.value, _FIELDS[_DOUBLE])
         if asked.value.type != _DOUBLE:
             return f"{asked.name}: got type {asked.value.type}, expected {_DOUBLE}, a double"
-        least, largest = parameter.range
+        value, (least, largest) = asked.value.double_value, parameter.range
         if not least <= value <= largest:
             return f"{asked.name}: got {value:g}, expected {least:g} to {largest:g}"
         return ""
@@ -146,59 +129,30 @@ class Parameters:
             "rcl_interfaces/msg/ParameterEvent",
             stamp=types.stamp(self._clock.wall()),
             node=self._path,
-            new_parameters=[],
-            changed_parameters=list(asked),
-            deleted_parameters=[],
+            changed_parameters=asked,
         )
         self._events.publish(event)
 
-    def _value(self, name: str) -> Value | None:
+    def _value(self, name: str) -> dict[str, Any]:
+        """Type and value of a parameter; empty (type 0: not set) if there is none."""
         parameter = self._parameters.get(name)
-        return None if parameter is None else parameter.value
+        if parameter is None:
+            return {}
+        kind, field = _TYPES[type(parameter.value)]
+        return {"type": kind, field: parameter.value}
 
-    def _descriptor(self, name: str) -> Any:
+    def _descriptor(self, name: str) -> dict[str, Any]:
         parameter = self._parameters.get(name)
+        if parameter is None:
+            return {"name": name}
         ranges = []
-        if parameter is not None and parameter.range is not None:
+        if parameter.range is not None:
             least, largest = parameter.range
-            kind = "rcl_interfaces/msg/FloatingPointRange"
-            ranges = [types.make(kind, from_value=least, to_value=largest, step=0.0)]
-        return types.make(
-            "rcl_interfaces/msg/ParameterDescriptor",
-            name=name,
-            type=_type(self._value(name)),
-            description="" if parameter is None else parameter.description,
-            additional_constraints="",
-            read_only=parameter is not None and parameter.set is None,
-            dynamic_typing=False,
-            floating_point_range=ranges,
-            integer_range=[],
-        )
-
-
-def _type(value: Value | None) -> int:
-    return _NOT_SET if value is None else _TYPES[type(value)]
-
-
-def _value(value: Value | None) -> Any:
-    fields: dict[str, Any] = {
-        "bool_value": False,
-        "integer_value": 0,
-        "double_value": 0.0,
-        "string_value": "",
-        "byte_array_value": np.empty(0, np.uint8),
-        "bool_array_value": np.empty(0, np.bool_),
-        "integer_array_value": np.empty(0, np.int64),
-        "double_array_value": np.empty(0),
-        "string_array_value": [],
-    }
-    kind = _type(value)
-    if value is not None:
-        fields[_FIELDS[kind]] = value
-    return types.make("rcl_interfaces/msg/ParameterValue", type=kind, **fields)
-
-
-def _result(reason: str) -> Any:
-    return types.make(
-        "rcl_interfaces/msg/SetParametersResult", successful=not reason, reason=reason
-    )
+            ranges = [{"from_value": least, "to_value": largest}]
+        return {
+            "name": name,
+            "type": self._value(name)["type"],
+            "description": parameter.description,
+            "read_only": parameter.set is None,
+            "floating_point_range": ranges,
+        }

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.console.control_run import ReferenceSource
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Command, Received, Servo
 from tautscope.console.operator_input import DEAD_BAND, OperatorInput
@@ -21,51 +19,10 @@ from tautscope.ros2.session import Node
 from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]
-SERVO, JOY = "servo_jp", "joy"
 QUEUE = 10
 """Number of references that wait for a tick; it takes the newest."""
 Refuse = Callable[[MessageError], None]
 """Called with the reason for which a message is refused."""
-
-
-class Source(ReferenceSource, Protocol):
-    """A source of references that can be started and clutched."""
-
-    def reset(self, reference: Floats) -> None:
-        """Start at a reference (n,) [m or rad]."""
-        ...
-
-    def engage(self) -> None:
-        """Follow the device again, from where the reference is."""
-        ...
-
-
-class Pausable:
-    """A source that is held by request too.
-
-    Args:
-        source: The source.
-        states: Has what was requested.
-    """
-
-    def __init__(self, source: Source, states: StateMachine) -> None:
-        self._source, self._states = source, states
-        self.reset, self.engage = source.reset, source.engage
-
-    @property
-    def reference(self) -> Floats:
-        """Reference u (n,) [m or rad] of the last tick."""
-        return self._source.reference
-
-    @property
-    def age(self) -> float | None:
-        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
-        return self._source.age
-
-    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The reference of a tick."""
-        is_held = is_held or self._states.goal is OperatingState.PAUSED
-        return self._source.update(now, period, command, is_held=is_held)
 
 
 class ServoReference:
@@ -78,21 +35,24 @@ class ServoReference:
 
     A stream that begins at ``setpoint_js`` has the offset 0. Between messages the last reference
     remains, and its age grows, by which the loop detects a silent device
-    (``safety.reference_age``). While the supervisor holds motion the reference rests.
+    (``safety.reference_age``). While motion is held, by the supervisor or by request, the reference
+    rests.
 
     Args:
         node: Subscribes.
-        topic: Of sensor_msgs/msg/JointState.
         joints: Names of the degrees of freedom.
         clock: Clock of the stamps.
         refuse: Called for refused messages.
+        states: Has what was requested.
     """
 
     def __init__(
-        self, node: Node, topic: str, joints: Sequence[str], clock: Clock, refuse: Refuse
+        self, node: Node, joints: Sequence[str], clock: Clock, refuse: Refuse, states: StateMachine
     ) -> None:
-        self._messages = node.subscription(topic, "sensor_msgs/msg/JointState", Qos(depth=QUEUE))
-        self._joints, self._clock, self._refuse = joints, clock, refuse
+        self._messages = node.subscription(
+            "instrument/servo_jp", "sensor_msgs/msg/JointState", Qos(depth=QUEUE)
+        )
+        self._joints, self._clock, self._refuse, self._states = joints, clock, refuse, states
         self._stamps = Stamps(self._messages.topic)
         self.reference = self._before = np.full(len(joints), np.nan)
         self._offset: Floats | None = None
@@ -114,7 +74,7 @@ class ServoReference:
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The newest reference (n,) [m or rad]; sets `age`."""
         found = self._take()
-        if is_held:
+        if is_held or self._states.goal is OperatingState.PAUSED:
             # The increment with which motion was stopped has not been followed.
             if self._made_at is not None:
                 self.reference = self._before
@@ -157,10 +117,10 @@ class JoyReference:
     Args:
         config: Limits of speed and travel.
         node: Subscribes.
-        topic: Of sensor_msgs/msg/Joy.
+        layout: Axes and button.
         clock: Clock of the stamps.
         refuse: Called for refused messages.
-        layout: Axes and button.
+        states: Has what was requested.
     """
 
     age: float | None = None
@@ -169,14 +129,14 @@ class JoyReference:
         self,
         config: Config,
         node: Node,
-        topic: str,
+        layout: JoyAxes,
         *,
         clock: Clock,
         refuse: Refuse,
-        layout: JoyAxes,
+        states: StateMachine,
     ) -> None:
-        self._messages = node.subscription(topic, "sensor_msgs/msg/Joy")
-        self._clock, self._refuse, self._layout = clock, refuse, layout
+        self._messages = node.subscription("joy", "sensor_msgs/msg/Joy")
+        self._layout, self._clock, self._refuse, self._states = layout, clock, refuse, states
         self._stamps = Stamps(self._messages.topic)
         self._operator = OperatorInput(config, _OneOperator(ImageTimes()))
 
@@ -212,6 +172,7 @@ class JoyReference:
                     raise MessageError(f"{self._messages.topic} axes", axes, allowed)
         except MessageError as error:
             self._refuse(error)
+        is_held = is_held or self._states.goal is OperatingState.PAUSED
         return self._operator.update(now, period, command, is_held=is_held)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from ipaddress import ip_address
 from typing import Any
 
@@ -12,7 +11,7 @@ import zenoh
 
 from tautscope.errors import ConfigError
 from tautscope.ros2 import types, wire
-from tautscope.ros2.endpoints import Publisher, Service, Subscription
+from tautscope.ros2.endpoints import Handler, Publisher, Service, Subscription
 from tautscope.ros2.wire import HUMBLE, JAZZY, NO_HASH, Entity, Qos
 
 ROUTER = "tcp/127.0.0.1:7447"
@@ -97,6 +96,7 @@ class Node:
         self._has_hashes = distribution != HUMBLE
         self._entities = 0
         self.subscriptions: list[Subscription] = []
+        self._services: list[Service] = []
 
     def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
         """A publisher of messages of a type."""
@@ -120,12 +120,17 @@ class Node:
         self.subscriptions.append(subscription)
         return subscription
 
-    def service(self, name: str, kind: str, handler: Callable[[Any], Any]) -> Service:
-        """A service; `handler` makes the response to a request."""
+    def add_service(self, name: str, kind: str, handler: Handler) -> None:
+        """Offer a service; `handler` makes the fields of the response to a request."""
         token, _ = self._announce(Entity.SERVICE, name, kind, Qos())
         channel: zenoh.handlers.FifoChannel[zenoh.Query] = zenoh.handlers.FifoChannel(16)
         queryable = self._session.declare_queryable(self._key(name, kind), channel, complete=True)
-        return Service(kind, queryable, token, handler)
+        self._services.append(Service(kind, queryable, token, handler))
+
+    def serve(self) -> None:
+        """Answer the requests that wait at the services."""
+        for service in self._services:
+            service.serve()
 
     def resolve(self, topic: str) -> str:
         """The full name of a topic: ``~/name`` is below the node, ``name`` below the namespace."""

@@ -14,7 +14,7 @@ from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
-from tautscope.ros2.endpoints import Publisher
+from tautscope.ros2.endpoints import IMAGE, Publisher
 from tautscope.ros2.session import SENSOR_DATA, Node
 
 STATE_PERIOD = 100_000_000
@@ -23,29 +23,12 @@ DIAGNOSTICS_PERIOD = 1_000_000_000
 """Time between two diagnostics, and between two warnings of the same field [ns]."""
 
 
-class Topics:
-    """Names of the topics of a node.
-
-    Args:
-        namespace: Of the node.
-    """
-
-    def __init__(self, namespace: str) -> None:
-        self.instrument = f"{namespace}/instrument"
-        self.image = f"{namespace}/endoscope/image_raw"
-        self.camera_info = f"{namespace}/endoscope/camera_info"
-        self.servo = f"{self.instrument}/servo_jp"
-        self.joy = f"{namespace}/joy"
-        self.state_command = f"{self.instrument}/state_command"
-
-
 class Telemetry:
     """Publishes ticks, image updates, state, warnings and diagnostics.
 
     Args:
         config: Of the loop.
         node: Publishes.
-        topics: Names of the topics.
         clock: The clocks.
         has_rig: Whether drives and camera are this process's, and not nodes of their own.
 
@@ -53,9 +36,7 @@ class Telemetry:
         refused: Field -> number of refused messages.
     """
 
-    def __init__(
-        self, config: Config, node: Node, topics: Topics, clock: Clock, *, has_rig: bool
-    ) -> None:
+    def __init__(self, config: Config, node: Node, clock: Clock, *, has_rig: bool) -> None:
         self._config, self._clock, self._has_rig = config, clock, has_rig
         self._node = node
         self._name = node.identity.path.lstrip("/")
@@ -63,7 +44,7 @@ class Telemetry:
         joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
 
         def publisher(name: str, kind: str) -> Publisher:
-            return node.publisher(f"{topics.instrument}/{name}", kind)
+            return node.publisher(f"instrument/{name}", kind)
 
         self._setpoint = publisher("setpoint_js", joints)
         self._tip = publisher("measured_js", joints)
@@ -75,12 +56,14 @@ class Telemetry:
         self._warning = publisher("warning", text)
         self._diagnostics = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
         if not config.dof:
-            self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
+            self._camera_info = node.publisher(
+                "endoscope/camera_info", "sensor_msgs/msg/CameraInfo"
+            )
         if has_rig:
             self._command = publisher("actuators/setpoint_js", joints)
             self._applied = publisher("actuators/measured_js", joints)
         if has_rig and not config.dof:
-            self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
+            self._image = node.publisher("endoscope/image_raw", IMAGE, SENSOR_DATA)
         # The transport may wait for a slow receiver; a tick may not.
         self._images = realtime_executor("images", OTHERS)
         self._sending: Future[None] = Future()

@@ -9,6 +9,7 @@ import struct
 from functools import cache
 from typing import Any
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.serde import SerdeError
@@ -56,6 +57,8 @@ SERVICES = {
 """Services -> definitions of request and response."""
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _LITTLE_ENDIAN = b"\x00\x01"
+_BYTES = {"byte": "uint8", "char": "uint8"}
+"""Names of ROS that NumPy lacks."""
 
 
 @cache
@@ -102,8 +105,27 @@ def type_hash(kind: str) -> str:
 
 
 def make(kind: str, **fields: Any) -> Any:
-    """A message of a type from its fields."""
+    """A message of a type from its fields; one that is not given is 0 or empty.
+
+    A message in it may be a dictionary of its fields.
+    """
+    for name, described in _store().fielddefs[kind][1]:
+        fields[name] = _value(described, fields.get(name))
     return _store().types[kind](**fields)
+
+
+def _value(described: FieldDesc, value: Any) -> Any:
+    """The value of a field by its description; None is 0 or empty."""
+    if described[0] is Nodetype.NAME:
+        return value if hasattr(value, "__msgtype__") else make(described[1], **value or {})
+    if described[0] is Nodetype.BASE:
+        zero = "" if described[1][0] == "string" else 0
+        return zero if value is None else value
+    element, length = described[1]
+    if element[0] is Nodetype.BASE and element[1][0] != "string":
+        name = _BYTES.get(element[1][0], element[1][0])
+        return np.zeros(length, name) if value is None else np.asarray(value, name)
+    return [_value(element, each) for each in value or ()]
 
 
 def encode(message: Any) -> bytes:

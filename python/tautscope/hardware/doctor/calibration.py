@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 from tautscope.config import CalibrationConfig, CalibrationRecord
 from tautscope.config.calibration import CALIBRATIONS
-from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.doctor.check_result import CheckResult, result
 
 BASES = {"geometry": ("camera", "colour"), "latency": ("geometry",)}
 """Calibration -> calibrations whose values it uses."""
@@ -49,24 +49,20 @@ def _check(
         for device, number in record.serial_numbers.items()
         if serial_numbers.get(device, number) != number
     ]
-    newer = [base for base in BASES.get(kind, ()) if _is_newer(getattr(config, base), record)]
+    bases = {base: getattr(config, base) for base in BASES.get(kind, ())}
+    newer = [base for base, used in bases.items() if used is not None and used.at > record.at]
+    missing = note = ""
     if other:
-        found = f"{found}; another device is connected: {', '.join(other)}"
-        return CheckResult("calibration", kind, "missing", found, todo, data)
-    if newer:
-        found = f"{found}; older than the calibration of {' and '.join(newer)} that it uses"
-        return CheckResult("calibration", kind, "missing", found, todo, data)
-    if age < -_CLOCK_TOLERANCE:
-        clock = "Set the clock of the computer: date"
-        return CheckResult("calibration", kind, "note", f"{found}: in the future", clock, data)
-    if age > config.largest_age * 86400:
-        found = f"{found}; stale: calibration.largest_age is {config.largest_age:g} days"
-        return CheckResult("calibration", kind, "note", found, todo, data)
-    return CheckResult("calibration", kind, "ok", found, data=data)
-
-
-def _is_newer(base: CalibrationRecord | None, record: CalibrationRecord) -> bool:
-    return base is not None and base.at > record.at
+        found, missing = f"{found}; another device is connected: {', '.join(other)}", todo
+    elif newer:
+        found += f"; older than the calibration of {' and '.join(newer)} that it uses"
+        missing = todo
+    elif age < -_CLOCK_TOLERANCE:
+        found, note = f"{found}: in the future", "Set the clock of the computer: date"
+    elif age > config.largest_age * 86400:
+        found += f"; stale: calibration.largest_age is {config.largest_age:g} days"
+        note = todo
+    return result("calibration", kind, found, data, missing=missing, note=note)
 
 
 def _days(age: float) -> str:

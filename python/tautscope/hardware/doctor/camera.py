@@ -14,7 +14,7 @@ from pathlib import Path
 from tautscope.config import CameraConfig
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, CameraState, Capture
-from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found, result
 
 FRAMES = 25
 """Number of frames from which rate and age are measured."""
@@ -33,13 +33,11 @@ def check_devices(*, needed: bool) -> CheckResult:
     names = {str(device): _name(device) for device in devices}
     forbidden = [path for path in names if not os.access(path, os.R_OK | os.W_OK)]
     found = ", ".join(f"{path} ({name})" for path, name in names.items())
-    data = {"devices": names}
+    todo = ""
     if forbidden:
+        found += f"; no permission: {forbidden}"
         todo = "sudo usermod -aG video $USER, then log in again"
-        return CheckResult(
-            "camera", "V4L2 devices", "missing", f"{found}; no permission: {forbidden}", todo, data
-        )
-    return CheckResult("camera", "V4L2 devices", "ok", found, data=data)
+    return result("camera", "V4L2 devices", found, {"devices": names}, missing=todo)
 
 
 def check_source(config: CameraConfig) -> list[CheckResult]:
@@ -60,7 +58,7 @@ def check_source(config: CameraConfig) -> list[CheckResult]:
         if source.url.startswith("pipe:"):
             found = replace(found, todo=f"{found.todo}; for DV over FireWire: {piped}")
         return [found]
-    return [_check_captures(what, config, captures, state), *_check_delay(config)]
+    return [_check_captures(what, config, captures, state), _check_delay(source.delay)]
 
 
 def _collect(camera: Camera, timeout: float) -> list[Capture]:
@@ -103,20 +101,20 @@ def _check_captures(
         "lost": state.lost,
         "damaged": state.damaged,
     }
+    todo = ""
     if state.lost or state.damaged:
+        found += f"; frames lost: {state.lost}, of them damaged: {state.damaged}"
         todo = "Check whether cable, hub or processor is too slow; end other programs"
-        lost = f"frames lost: {state.lost}, of them damaged: {state.damaged}"
-        return CheckResult("camera", what, "note", f"{found}; {lost}", todo, data)
-    return CheckResult("camera", what, "ok", found, data=data)
+    return result("camera", what, found, data, note=todo)
 
 
-def _check_delay(config: CameraConfig) -> list[CheckResult]:
-    source = config.source
-    if source.delay > 0:
-        found = f"{1e3 * source.delay:.0f} ms, as configured"
-        return [CheckResult("camera", "constant delay", "note", found)]
-    todo = "tautscope calibrate geometry measures it: an unknown delay is estimated as slack"
-    return [CheckResult("camera", "constant delay", "note", "0 ms: not measured yet", todo)]
+def _check_delay(delay: float) -> CheckResult:
+    if delay > 0:
+        found, todo = f"{1e3 * delay:.0f} ms, as configured", ""
+    else:
+        found = "0 ms: not measured yet"
+        todo = "tautscope calibrate geometry measures it: an unknown delay is estimated as slack"
+    return CheckResult("camera", "constant delay", "note", found, todo)
 
 
 def _name(device: Path) -> str:

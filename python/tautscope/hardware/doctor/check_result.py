@@ -36,11 +36,17 @@ class CheckResult:
         return asdict(self)
 
 
+def result(
+    group: str, what: str, found: str, data: dict[str, Any], *, missing: str = "", note: str = ""
+) -> CheckResult:
+    """The result of a check: ok without the remedies `missing` and `note`."""
+    status: Status = "missing" if missing else "note" if note else "ok"
+    return CheckResult(group, what, status, found, missing or note, data)
+
+
 def none_found(group: str, what: str, todo: str, *, needed: bool) -> CheckResult:
     """The result of a search without a hit, with a remedy if one is `needed`."""
-    if needed:
-        return CheckResult(group, what, "missing", "none", todo)
-    return CheckResult(group, what, "note", "none")
+    return CheckResult(group, what, "missing" if needed else "note", "none", todo if needed else "")
 
 
 def from_error(group: str, what: str, error: TautscopeError) -> CheckResult:

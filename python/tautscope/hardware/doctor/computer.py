@@ -8,13 +8,14 @@ import platform
 import shutil
 import tempfile
 import time
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.config.servos import PORTS
 from tautscope.extras import MODULES, missing_modules
-from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.doctor.check_result import CheckResult, Status, result
 from tautscope.hardware.realtime import REMEDY, SETPOINTS, locked_memory, realtime
 from tautscope.loop.frame_layout import FrameLayout
 
@@ -42,8 +43,20 @@ def check_computer(config: Config) -> list[CheckResult]:
         _extra("hardware"),
         *([_extra("ethercat")] if protocol == "ethercat" else []),
         *([_extra("servo")] if protocol in PORTS else []),
-        _priority(),
-        _memory(),
+        _permission(
+            "real-time priority",
+            realtime(SETPOINTS),
+            f"SCHED_FIFO {SETPOINTS} is permitted",
+            "SCHED_FIFO is not permitted",
+            "missing",
+        ),
+        _permission(
+            "memory kept",
+            locked_memory(),
+            "memory can be locked",
+            "memory may be paged out, and set-points may wait for the disk",
+            "note",
+        ),
     ]
 
 
@@ -68,14 +81,14 @@ def check_disk(config: Config, folder: Path) -> CheckResult:
         f"{needed / 1e6:.0f} MB/s: {minutes:.0f} min"
     )
     data = {"free": free, "bytes_per_second": speed, "needed_per_second": needed}
-    smaller = 'or record smaller images: recording.image_format = "jpeg"'
+    todo = ""
     if minutes * 60 < MIN_RECORDING_TIME:
-        todo = f"Run in a folder with more space: df -h {folder}; {smaller}"
-        return CheckResult("recording", "disk", "missing", found, todo, data)
-    if speed < needed:
-        todo = f"Run in a folder on a faster disk; {smaller}"
-        return CheckResult("recording", "disk", "missing", found, todo, data)
-    return CheckResult("recording", "disk", "ok", found, data=data)
+        todo = f"Run in a folder with more space: df -h {folder}"
+    elif speed < needed:
+        todo = "Run in a folder on a faster disk"
+    if todo:
+        todo += '; or record smaller images: recording.image_format = "jpeg"'
+    return result("recording", "disk", found, data, missing=todo)
 
 
 def _extra(name: str) -> CheckResult:
@@ -86,25 +99,16 @@ def _extra(name: str) -> CheckResult:
     return CheckResult("computer", what, "ok", ", ".join(MODULES[name]))
 
 
-def _priority() -> CheckResult:
-    what = "real-time priority"
-    with realtime(SETPOINTS) as refusal:
+def _permission(
+    what: str, setting: AbstractContextManager[str], granted: str, refused: str, status: Status
+) -> CheckResult:
+    """Try a setting that the system may refuse."""
+    with setting as refusal:
         if not refusal:
-            return CheckResult("computer", what, "ok", f"SCHED_FIFO {SETPOINTS} is permitted")
+            return CheckResult("computer", what, "ok", granted)
     if platform.system() != "Linux":
         return CheckResult("computer", what, "note", refusal, "Use Linux for a rig")
-    return CheckResult("computer", what, "missing", "SCHED_FIFO is not permitted", REMEDY)
-
-
-def _memory() -> CheckResult:
-    what = "memory kept"
-    with locked_memory() as refusal:
-        if not refusal:
-            return CheckResult("computer", what, "ok", "memory can be locked")
-    if platform.system() != "Linux":
-        return CheckResult("computer", what, "note", refusal)
-    found = "memory may be paged out, and set-points may wait for the disk"
-    return CheckResult("computer", what, "note", found, REMEDY)
+    return CheckResult("computer", what, status, refused, REMEDY)
 
 
 def _speed(folder: Path, size: int) -> float:

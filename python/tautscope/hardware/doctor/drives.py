@@ -11,7 +11,7 @@ from tautscope.config import Config, DrivesConfig
 from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Motor
 from tautscope.errors import ConfigError, DriveError, TautscopeError
-from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found, result
 from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
 from tautscope.hardware.drives import open_group
 from tautscope.hardware.plausibility import check_experiment
@@ -48,9 +48,8 @@ def check_interfaces(*, needed: bool) -> CheckResult:
         and not str(one["channel"]).startswith(BUILT_IN_PORT)
     }
     names |= {f"socketcan {path.name}" for path in Path("/sys/class/net").glob("can*")}
-    data = {"interfaces": sorted(names)}
     if names:
-        return CheckResult("drives", what, "ok", ", ".join(sorted(names)), data=data)
+        return result("drives", what, ", ".join(sorted(names)), {"interfaces": sorted(names)})
     todo = (
         "Connect an adapter; on Linux: sudo modprobe can_dev; ip -br link | grep can; sudo ip link "
         "set can0 up type can bitrate 1000000"
@@ -108,10 +107,12 @@ def _check_latency(config: DrivesConfig) -> list[CheckResult]:
         return []
     found = int(timer.read_text(encoding="ascii"))
     what = f"latency of {config.channel}"
-    if 1e-3 * found < config.reply_timeout / 2:
-        return [CheckResult("drives", what, "ok", f"{found} ms")]
-    todo = f"echo 1 | sudo tee {timer}; again after each time it is connected, or by a udev rule"
-    return [CheckResult("drives", what, "missing", f"{found} ms", todo)]
+    todo = ""
+    if 1e-3 * found >= config.reply_timeout / 2:
+        todo = (
+            f"echo 1 | sudo tee {timer}; again after each time it is connected, or by a udev rule"
+        )
+    return [result("drives", what, f"{found} ms", {}, missing=todo)]
 
 
 def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckResult:
@@ -137,21 +138,20 @@ def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckRe
             f"Move it by hand into {dof.key}.travel, {scale * lower:.4g} to "
             f"{scale * upper:.4g} {unit}; or correct home, sign or counts_per_unit"
         )
-    return CheckResult("drives", what, "missing" if todo else "ok", found, todo, data)
+    return result("drives", what, found, data, missing=todo)
 
 
 def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
     mode = f"mode {drive.mode}; " if drive.mode else ""
     found = f"{mode}{len(drive.settings)} settings read back correctly"
     data = {"mode": drive.mode, "settings": drive.settings, "absent": list(drive.absent)}
-    what = f"{drive.name}: settings"
+    todo = ""
     if config.waive:
         found += f"; waived: {', '.join(config.waive)}"
     if drive.absent:
         todo = "Make sure that other protections replace these objects"
-        found = f"{found}; it does not have or take {', '.join(drive.absent)}"
-        return CheckResult("drives", what, "note", found, todo, data)
-    return CheckResult("drives", what, "ok", found, data=data)
+        found += f"; it does not have or take {', '.join(drive.absent)}"
+    return result("drives", f"{drive.name}: settings", found, data, note=todo)
 
 
 def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
@@ -172,14 +172,12 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
     if silent:
         found = f"no answer to any of {len(times)} set-points from {', '.join(silent)}"
         todo = "Its PDOs are not as configured; power-cycle it"
-        return CheckResult("drives", what, "missing", found, todo, data)
+        return result("drives", what, found, data, missing=todo)
     every = f"both ways every {1e3 * config.heartbeat_period:.0f} ms; "
     found = (
         f"{'' if config.protocol in SERIAL_PORTS else every}{len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
         f"{late} of {len(config.all_motors) * len(times)} late"
     )
-    if late:
-        todo = "Expected: none, with real-time priority and no other load"
-        return CheckResult("drives", what, "note", found, todo, data)
-    return CheckResult("drives", what, "ok", found, data=data)
+    todo = "Expected: none, with real-time priority and no other load" if late else ""
+    return result("drives", what, found, data, note=todo)

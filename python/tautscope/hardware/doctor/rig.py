@@ -12,7 +12,7 @@ import numpy as np
 from tautscope.config import Config
 from tautscope.dof import display_text
 from tautscope.errors import SignalError, TautscopeError
-from tautscope.hardware.doctor.check_result import CheckResult, from_error
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, result
 from tautscope.hardware.doctor.sensors import check_sensors
 from tautscope.loop.actuators import ActuatedRig
 from tautscope.loop.rig import Rig, Sample, check_sample
@@ -61,13 +61,11 @@ def _check_clock(samples: list[Sample], period: float) -> CheckResult:
     median, least = float(np.median(steps)), float(steps.min())
     found = f"{1e3 * median:.4g} ms per step, {1e3 * steps.max():.4g} ms at most"
     data = {"median": median, "largest": float(steps.max()), "least": least}
-    if least <= 0 or abs(median / period - 1) > _TOLERANCE:
-        todo = (
-            f"Sample.time is in s and advances by control_period, {1e3 * period:g} ms, with every "
-            "step"
-        )
-        return CheckResult("rig", "clock", "missing", found, todo, data)
-    return CheckResult("rig", "clock", "ok", found, data=data)
+    todo = (
+        f"Sample.time is in s and advances by control_period, {1e3 * period:g} ms, with every step"
+    )
+    is_wrong = least <= 0 or abs(median / period - 1) > _TOLERANCE
+    return result("rig", "clock", found, data, missing=todo if is_wrong else "")
 
 
 def _check_pace(durations: list[float], period: float) -> CheckResult:
@@ -77,10 +75,8 @@ def _check_pace(durations: list[float], period: float) -> CheckResult:
         f"{1e3 * max(durations):.3g} ms at most"
     )
     data = {"share_of_period": share, "largest": max(durations)}
-    if abs(share - 1) > _TOLERANCE:
-        todo = "Right for a simulation; of motors, step() returns after one control_period"
-        return CheckResult("rig", "pace", "note", found, todo, data)
-    return CheckResult("rig", "pace", "ok", found, data=data)
+    todo = "Right for a simulation; of motors, step() returns after one control_period"
+    return result("rig", "pace", found, data, note=todo if abs(share - 1) > _TOLERANCE else "")
 
 
 def _check_applied(samples: list[Sample], config: Config) -> CheckResult:
@@ -96,12 +92,12 @@ def _check_applied(samples: list[Sample], config: Config) -> CheckResult:
             or values.max() > high + margin
         ):
             todo = f"Sample.applied is in {dof.unit}, in the order of [[dof]], within its range"
-            return CheckResult("rig", f"applied {dof.name}", "missing", found, todo, data)
+            return result("rig", f"applied {dof.name}", found, data, missing=todo)
         if np.ptp(values) > dof.width_limit / 4:
             moved = f"{found}; moved by {dof.display_scale * np.ptp(values):.3g} {dof.display_unit}"
             todo = "The command was the position after reset(): check sign, unit and order"
-            return CheckResult("rig", f"applied {dof.name}", "missing", moved, todo, data)
-    return CheckResult("rig", "applied", "ok", found, data=data)
+            return result("rig", f"applied {dof.name}", moved, data, missing=todo)
+    return result("rig", "applied", found, data)
 
 
 def _check_actuators(rig: ActuatedRig, config: Config) -> CheckResult:

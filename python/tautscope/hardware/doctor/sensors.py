@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import TautscopeError
-from tautscope.hardware.doctor.check_result import CheckResult, Status, from_error
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, result
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.measurement import Measurement, Reading, Sensors, raw_values
 from tautscope.loop.rig import Sample
@@ -95,8 +95,7 @@ def _check_sensor(sensor: int, arrivals: list[_Arrival], config: Config) -> Chec
     elif repeats and np.mean(repeats) > _REPEATED:
         found += f", {np.mean(repeats):.0%} repeat the last value"
         note = "A sensor with noise does not: give a measurement only when there is a new one"
-    status: Status = "missing" if missing else "note" if note else "ok"
-    return CheckResult("rig", what, status, found, missing or note, data)
+    return result("rig", what, found, data, missing=missing, note=note)
 
 
 def _implausible(arrivals: list[_Arrival], config: Config) -> str:

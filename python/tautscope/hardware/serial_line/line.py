@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import Protocol
+from typing import Any
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import BusError
@@ -18,28 +18,7 @@ _WRITE_TIMEOUT = 0.1
 """How long the port may take no byte [s]."""
 
 
-class Port(Protocol):
-    """The part of `serial.Serial` that is used here."""
-
-    @property
-    def in_waiting(self) -> int:
-        """Number of bytes that have come."""
-        ...
-
-    def read(self, size: int, /) -> bytes:
-        """At most `size` bytes; none if none comes for `_WAIT`."""
-        ...
-
-    def write(self, data: bytes, /) -> object:
-        """Send bytes."""
-        ...
-
-    def close(self) -> None:
-        """Release the port; a second call does nothing."""
-        ...
-
-
-def open_port(config: DrivesConfig) -> Port:
+def open_port(config: DrivesConfig) -> Any:
     """Open the port.
 
     Raises:
@@ -66,8 +45,7 @@ def open_port(config: DrivesConfig) -> Port:
         ) from None
     if sys.platform != "win32":
         _keep_running(port.fileno())
-    opened: Port = port
-    return opened
+    return port
 
 
 def _keep_running(file: int) -> None:
@@ -83,13 +61,13 @@ class SerialLine:
     """Requests and answers on an open port.
 
     Args:
-        port: Closed with it.
+        port: A `serial.Serial`, which is closed with it.
         channel: Its name, for messages.
 
     Every method raises `BusError` if the port is lost.
     """
 
-    def __init__(self, port: Port, channel: str) -> None:
+    def __init__(self, port: Any, channel: str) -> None:
         self._port, self._name = port, f"microcontroller on {channel}"
         self._buffer = bytearray()
         self._number = 0

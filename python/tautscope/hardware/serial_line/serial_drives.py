@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 import time
+from typing import Any
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
@@ -20,11 +21,17 @@ from tautscope.errors import (
     SilentDriveError,
     StateError,
 )
-from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus, NewestAnswer
+from tautscope.hardware.drive_group import (
+    CommissionedDrive,
+    DriveGroup,
+    DriveStatus,
+    Feedback,
+    paused,
+)
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import FAULTS, Hello, Limits, Refusal, Request, State
-from tautscope.hardware.serial_line.line import Port, SerialLine
+from tautscope.hardware.serial_line.line import SerialLine
 
 _START = 4.0
 """How long a microcontroller may take to start after its port was opened [s]."""
@@ -33,7 +40,7 @@ _REPEAT = 0.1
 _FAULT = "Find the cause, then start with reset_faults"
 
 
-class SerialDrives:
+class SerialDrives(DriveGroup):
     """Motors behind a microcontroller.
 
     Args:
@@ -45,16 +52,11 @@ class SerialDrives:
         ModeRefusedError: It speaks another version of the protocol.
     """
 
-    pending = 1
-
-    def __init__(self, config: DrivesConfig, port: Port) -> None:
-        self._config = config
+    def __init__(self, config: DrivesConfig, port: Any) -> None:
+        super().__init__(config)
         self._name = f"microcontroller on {config.channel}"
         self._line = SerialLine(port, config.channel)
-        self._feedback = [NewestAnswer() for _ in config.all_motors]
         self._targets: list[int] = []
-        self._sent_at = 0.0
-        self._is_moving = self._was_enabled = False
         try:
             self._axes = self._greet().axes
         except BaseException:
@@ -64,10 +66,6 @@ class SerialDrives:
     def name(self, dof: Motor) -> str:
         """See `DriveGroup.name`."""
         return f"{dof.label}, axis {self._config[dof].node}"
-
-    def serial_number(self, dof: Motor) -> str:
-        """Motors have none."""
-        return ""
 
     def status(self, dof: Motor) -> DriveStatus:
         """Read state, fault and position.
@@ -111,26 +109,17 @@ class SerialDrives:
             )
         return CommissionedDrive(self.name(dof), 0, 0, 0, limits._asdict())
 
-    def configure(self) -> None:
-        """Do nothing: `enable` sets the watchdog."""
-
     def read_positions(self) -> list[int]:
         """Read the positions."""
         status = self._ask(Request.READ)
         return [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
 
-    def start(self, positions: list[int]) -> None:
-        """See `DriveGroup.start`."""
-        now = self._sent_at = time.monotonic()
-        for one, position in zip(self._feedback, positions, strict=True):
-            one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, now
-
-    def probe(self) -> list[NewestAnswer]:
+    def probe(self) -> list[Feedback]:
         """Read all axes once."""
         self._receive(self._line.send(Request.READ))
         return self._feedback
 
-    def enable(self, *, reset_faults: bool) -> list[NewestAnswer]:
+    def enable(self, *, reset_faults: bool) -> list[Feedback]:
         """See `DriveGroup.enable`."""
         status = self._ask(Request.READ)
         if reset_faults:
@@ -150,7 +139,7 @@ class SerialDrives:
         self.start(targets)
         return self.exchange(targets)
 
-    def exchange(self, targets: list[int]) -> list[NewestAnswer]:
+    def exchange(self, targets: list[int]) -> list[Feedback]:
         """Send the set-points, read the positions.
 
         Raises:
@@ -158,28 +147,19 @@ class SerialDrives:
             EmergencyError: A motor has a fault.
             BusError: The port is lost.
         """
-        now = time.monotonic()
-        pause, self._sent_at = now - self._sent_at, now
-        if pause > self._config.heartbeat_timeout:
-            raise self._paused(pause)
+        self._check_pause(self._name)
         for dof, target in zip(self._config.all_motors, targets, strict=True):
             self._targets[self._config[dof].node - 1] = target
         self._receive(self._line.send(Request.SETPOINTS, frames.setpoints(self._targets)))
         return self._feedback
 
-    def quick_stop(self) -> list[str]:
+    def _stop(self) -> list[str]:
         """Stop all motors, and hold or release them, as `after_quick_stop`."""
-        if not self._is_moving:
-            return []
-        self._is_moving = False
         is_held = self._config.after_quick_stop == "hold"
         return self._command(Request.STOP if is_held else Request.DISABLE)
 
-    def disable(self) -> list[str]:
-        """Stop, then switch the motors off."""
-        if not self._was_enabled:
-            return []
-        return self.quick_stop() or self._command(Request.DISABLE)
+    def _switch_off(self) -> list[str]:
+        return self._command(Request.DISABLE)
 
     def close(self) -> None:
         """Release the port; a second call does nothing."""
@@ -259,7 +239,7 @@ class SerialDrives:
     def _check(self, status: frames.Status) -> None:
         self._check_faults(status, EmergencyError)
         if status.state == State.SILENCE:
-            raise self._paused(time.monotonic() - self._sent_at)
+            raise paused(self._name, self._config, time.monotonic() - self._sent_at)
         if status.state != State.ENABLED:
             raise StateError(
                 self._name,
@@ -277,14 +257,6 @@ class SerialDrives:
                 dofs = [dof for dof in self._config.all_motors if self._config[dof].node == at + 1]
                 name = self.name(dofs[0]) if dofs else f"axis {at + 1}"
                 raise error(name, f"it reports a fault: {_fault_name(fault)}", _FAULT)
-
-    def _paused(self, pause: float) -> StateError:
-        return StateError(
-            self._name,
-            f"no set-point for {1e3 * pause:.0f} ms or more, and its watchdog is "
-            f"drives.heartbeat_timeout, {1e3 * self._config.heartbeat_timeout:.0f} ms",
-            "Check the load of this computer (tautscope doctor) and the line",
-        )
 
 
 def _fault_name(number: int) -> str:

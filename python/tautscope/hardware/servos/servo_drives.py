@@ -13,7 +13,7 @@ import time
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.errors import DriveError, EmergencyError, StateError
-from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus, NewestAnswer
+from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup, DriveStatus, Feedback
 from tautscope.hardware.servos.families import FAMILIES, Register
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
 from tautscope.hardware.servos.servo import Servo
@@ -22,7 +22,7 @@ _WATCHDOG_UNIT = 0.02
 """Unit of the bus watchdog [s]."""
 
 
-class ServoDrives:
+class ServoDrives(DriveGroup):
     """Servos on a serial line.
 
     Args:
@@ -33,26 +33,18 @@ class ServoDrives:
         BusError: The port cannot be opened.
     """
 
-    pending = 1
-
     def __init__(self, config: DrivesConfig) -> None:
-        self._config = config
+        super().__init__(config)
         self._family = family = FAMILIES[config.protocol]
         self._line = ServoLine(config, family)
         self._servos = [Servo(config, dof, self._line) for dof in config.all_motors]
         self._ids = [servo.id for servo in self._servos]
-        self._feedback = [NewestAnswer() for _ in config.all_motors]
         self._goals = [0] * len(config.all_motors)
-        self._sent_at = 0.0
-        self._has_lost_answers = self._is_moving = self._was_enabled = False
+        self._has_lost_answers = False
 
     def name(self, dof: Motor) -> str:
         """See `DriveGroup.name`."""
         return self._servos[dof].name
-
-    def serial_number(self, dof: Motor) -> str:
-        """Servos have none."""
-        return ""
 
     def status(self, dof: Motor) -> DriveStatus:
         """See `Servo.status`."""
@@ -62,9 +54,6 @@ class ServoDrives:
         """See `Servo.commission`."""
         return self._servos[dof].commission()
 
-    def configure(self) -> None:
-        """Nothing: the bus watchdog is set when the motors are enabled."""
-
     def read_positions(self) -> list[int]:
         """See `DriveGroup.read_positions`."""
         return [servo.read(self._family.position) for servo in self._servos]
@@ -73,16 +62,14 @@ class ServoDrives:
         """See `DriveGroup.start`."""
         self._goals = positions
         self._line.set_timeout(self._config.reply_timeout)
-        now = self._sent_at = time.monotonic()
-        for one, position in zip(self._feedback, positions, strict=True):
-            one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, now
+        super().start(positions)
 
-    def probe(self) -> list[NewestAnswer]:
+    def probe(self) -> list[Feedback]:
         """Read all servos once."""
         self._receive()
         return self._feedback
 
-    def enable(self, *, reset_faults: bool) -> list[NewestAnswer]:
+    def enable(self, *, reset_faults: bool) -> list[Feedback]:
         """See `DriveGroup.enable`."""
         family = self._family
         self._line.set_timeout(self._config.request_timeout)
@@ -106,7 +93,7 @@ class ServoDrives:
         self.start(self._goals)
         return self.exchange(self._goals)
 
-    def exchange(self, targets: list[int]) -> list[NewestAnswer]:
+    def exchange(self, targets: list[int]) -> list[Feedback]:
         """Send the set-points, read the positions.
 
         Raises:
@@ -114,38 +101,23 @@ class ServoDrives:
             EmergencyError: A servo reports a fault.
             BusError: The port is lost.
         """
-        now = time.monotonic()
-        pause, self._sent_at = now - self._sent_at, now
-        if pause > self._config.heartbeat_timeout:
-            raise StateError(
-                f"servos on {self._config.channel}",
-                f"no set-point for {1e3 * pause:.0f} ms, which is more than "
-                "drives.heartbeat_timeout",
-                "Check the load of this computer (tautscope doctor)",
-            )
+        self._check_pause(f"servos on {self._config.channel}")
         self._goals = targets
         self._line.write_all(dict(zip(self._ids, targets, strict=True)), self._family.goal)
         self._receive()
         return self._feedback
 
-    def quick_stop(self) -> list[str]:
+    def _stop(self) -> list[str]:
         """Hold each motor where it was in the last cycle, or release it, as `after_quick_stop`."""
-        if not self._is_moving:
-            return []
-        self._is_moving = False
-        goals = [one.position for one in self._feedback]
-        unconfirmed = self._command_until(self._family.goal, goals)
+        unconfirmed = self._command_until(
+            self._family.goal, [one.position for one in self._feedback]
+        )
         if self._config.after_quick_stop == "release" and not unconfirmed:
-            return self._command_until(self._family.torque, [0] * len(self._servos))
+            return self._switch_off()
         return unconfirmed
 
-    def disable(self) -> list[str]:
-        """Stop, then switch the torque off."""
-        if not self._was_enabled:
-            return []
-        return self.quick_stop() or self._command_until(
-            self._family.torque, [0] * len(self._servos)
-        )
+    def _switch_off(self) -> list[str]:
+        return self._command_until(self._family.torque, [0] * len(self._servos))
 
     def close(self) -> None:
         """Release the port; a second call does nothing."""
