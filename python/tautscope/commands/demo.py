@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, robot
-from tautscope.commands.printing import (
-    announce,
-    console,
-    print_json,
-    print_table,
-    progress_bar,
-)
+from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
@@ -112,9 +106,7 @@ def _run(options: argparse.Namespace) -> None:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     print_json(options, {"folder": str(folder), **found.to_json()})
-    _print_table1(found)
-    _print_operator_motion(found)
-    _print_facts(found, folder)
+    _print_summary(found, folder)
 
 
 def _run_robot(options: argparse.Namespace) -> None:
@@ -144,56 +136,33 @@ def _load(options: argparse.Namespace) -> Config:
     return config
 
 
-def _title(text: str, seeds: int) -> str:
-    return f"{text} (median of {seeds} seeds, worst in brackets)" if seeds > 1 else text
+def _print_summary(demo: Demo, folder: Path) -> None:
+    dofs = ", ".join(dof.label for dof in demo.results[0])
+    several = f", medians of {len(demo.seeds)} seeds" if len(demo.seeds) > 1 else ""
+    left = [
+        f"{_figures(results, ROWS, 'compensated')} with profile {name}"
+        for name, results in demo.by_profile.items()
+    ]
+    reduction = _figures(demo.operator_results, OPERATOR_ROWS, "reduction")
+    lines = [
+        f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s ({dofs}{several}).",
+        f"Slow sines: of {_figures(demo.results, ROWS, 'uncompensated')} of slack there remain "
+        f"{', '.join(left)}.",
+        f"An operator's motion of all at once: tracking error less by {reduction}.",
+        f"Without and with compensation: {folder / 'film.gif'}",
+        f"Tables, figures, {len(demo.warnings)} warnings of the loop: {folder / 'report.html'}",
+    ]
+    print("\n".join(lines))
 
 
-def _cell(row: Row, dof: NamedDof, results: Sequence[dict[NamedDof, Any]]) -> str:
-    """The median of a figure of a DOF, and of several seeds the worst one in brackets."""
+def _figures(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: str) -> str:
+    """The median of a figure of each DOF."""
     from tautscope.report import tables  # noqa: PLC0415
     from tautscope.report.results import combine  # noqa: PLC0415
 
-    middle, bad = (
-        tables.cell(row, dof, getattr(combine(results, how)[dof], row.name))
-        for how in ("median", "worst")
-    )
-    return f"{middle} ({bad})" if len(results) > 1 else middle
-
-
-def _print_table1(demo: Demo) -> None:
-    from tautscope.report import tables  # noqa: PLC0415
-
-    profiles, dofs = demo.by_profile, list(demo.results[0])
-    headings, rows = [""], []
-    for dof in dofs:
-        headings += [f"{tables.heading(dof)}\narticle", *(f"\n{name}" for name in profiles)]
-    for row in ROWS:
-        cells = []
-        for dof in dofs:
-            cells.append(tables.article_cell(row, dof))
-            cells += [_cell(row, dof, results) for results in profiles.values()]
-        rows.append([row.title, *cells])
-    title = _title("Table 1: the article, and the twin", len(demo.seeds))
-    print_table(headings, rows, title=title, dim=range(1, len(headings), len(profiles) + 1))
-    print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
-
-
-def _print_operator_motion(demo: Demo) -> None:
-    from tautscope.report import tables  # noqa: PLC0415
-
-    results = demo.operator_results
-    dofs = list(results[0])
-    rows = [[row.title, *(_cell(row, dof, results) for dof in dofs)] for row in OPERATOR_ROWS]
-    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
-    headings = ["", *map(tables.heading, dofs)]
-    print_table(headings, rows, title=_title(title, len(results)))
-    print("Errors of the true tip, after the first 40 s.\n")
-
-
-def _print_facts(demo: Demo, folder: Path) -> None:
-    screen = console()
-    screen.print(f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s.")
-    for line in demo.warnings:
-        screen.print(f"Warning: {line}.", soft_wrap=True)
-    screen.print(f"Without and with compensation: {folder / 'film.gif'}", soft_wrap=True)
-    screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)
+    row = next(row for row in rows if row.name == name)
+    texts = []
+    for dof, found in combine(results, "median").items():
+        unit = f" {dof.display_unit}" if row.kind == "length" else ""
+        texts.append(f"{tables.cell(row, dof, getattr(found, name))}{unit}")
+    return " / ".join(texts)
