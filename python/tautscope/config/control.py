@@ -75,7 +75,7 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     direction_travel: Positive = 0.02
     """Half of the travel of the reference in which its direction reverses."""
     change_rate: Positive = 0.01
-    """Largest lasting change of the contact offsets and of the predicted tip, per travel of the
+    """Largest change of the contact offsets and of the predicted tip in use, per travel of the
     reference."""
 
 

@@ -83,7 +83,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Largest decrease of an estimated contact offset within a stroke; beyond it there was less
     slack than was compensated [in ahead_limit]."""
     cycle_swings: Count = 4
-    """Growing swings in a row, of reference and tip, that are a limit cycle."""
+    """Growing half periods in a row, of reference and tip, that are a limit cycle."""
     cycle_growth: Positive = 1.1
     """Ratio of a swing to the last one, from which it grows."""
     cycle_time: Positive = 2.0

@@ -6,8 +6,8 @@
 pub struct LawSettings {
     /// Largest speed of the predicted tip over that of the reference.
     pub tip_gain: f64,
-    /// Travel of the reference over which its direction is averaged.
+    /// Half of the travel of the reference in which its direction reverses.
     pub direction_travel: f64,
-    /// Largest lasting change of the contact offsets and of the predicted tip, per travel of the reference.
+    /// Largest change of the contact offsets and of the predicted tip in use, per travel of the reference.
     pub change_rate: f64,
 }
