@@ -146,7 +146,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_MERGED = 7,
     // Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     TAUTSCOPE_FLAG_LOST = 8,
-    // What was measured does not determine every degree of freedom.
+    // A degree of freedom has moved without a measurement that determines it.
     TAUTSCOPE_FLAG_UNOBSERVABLE = 9,
     // The rig reports that a drive does not follow its command.
     TAUTSCOPE_FLAG_FOLLOWING_ERROR = 10,
@@ -164,9 +164,9 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_DRIVE_FAULT = 16,
     // The rig reports that the tip does not follow its command in sign or scale.
     TAUTSCOPE_FLAG_START_CHECK = 17,
-    // The estimated slack reached `width_limit` or `offset_limit`.
+    // The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     TAUTSCOPE_FLAG_WIDTH_LIMIT = 18,
-    // The command limiter changed a command.
+    // A limit of travel, speed or actuators changed a command, or the software is wrong.
     TAUTSCOPE_FLAG_MONITOR = 19,
     // A command would have moved faster than `command_speed`.
     TAUTSCOPE_FLAG_COMMAND_JUMP = 20,
@@ -178,7 +178,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_LIMIT_CYCLE = 23,
     // The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
-    // The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
+    // The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,
     // Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
     TAUTSCOPE_FLAG_FRAME_RATE = 26,

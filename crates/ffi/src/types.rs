@@ -311,7 +311,7 @@ pub enum TautscopeFlag {
     Merged = 7,
     /// Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     Lost = 8,
-    /// What was measured does not determine every degree of freedom.
+    /// A degree of freedom has moved without a measurement that determines it.
     Unobservable = 9,
     /// The rig reports that a drive does not follow its command.
     FollowingError = 10,
@@ -329,9 +329,9 @@ pub enum TautscopeFlag {
     DriveFault = 16,
     /// The rig reports that the tip does not follow its command in sign or scale.
     StartCheck = 17,
-    /// The estimated slack reached `width_limit` or `offset_limit`.
+    /// The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     WidthLimit = 18,
-    /// The command limiter changed a command.
+    /// A limit of travel, speed or actuators changed a command, or the software is wrong.
     Monitor = 19,
     /// A command would have moved faster than `command_speed`.
     CommandJump = 20,
@@ -343,7 +343,7 @@ pub enum TautscopeFlag {
     LimitCycle = 23,
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = 24,
-    /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
+    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     GeometryOff = 25,
     /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
     FrameRate = 26,

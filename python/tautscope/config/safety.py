@@ -73,7 +73,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Least one-way motion of the reference that is a tremor [in update_distance]."""
     tremor_rate: Positive = 4.0
     """Reversals of the reference, within width_limit, that are a tremor [1/s]."""
-    ahead_limit: Positive = 0.1
+    ahead_limit: Positive = 0.2
     """How much farther than the reference the tip may move in a stroke; beyond it there is less
     slack than is compensated [in width_limit]."""
     ahead_ratio: Positive = 1.5

@@ -176,7 +176,7 @@ impl<P: SensorProfile<N>, const N: usize> Sight<P, N> for Reading<'_> {
 
 impl<const N: usize, const D: usize> SensorProfile<N> for Best<N, N, 0, D> {
     fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError> {
-        Self::with_geometry(settings, limits, [], [SLACK_CHANGED; N], f64::NAN)
+        Self::with_geometry(settings, limits, [], [SLACK_CHANGED; N])
     }
 
     fn measure(

@@ -21,8 +21,6 @@ use crate::model::features::{FeatureModel, FeaturePrediction};
 
 /// Limits of the low-passed error of the predicted tip, in units.
 const SLACK_CHANGED: PerDof<f64> = [0.13, 0.3, 0.13];
-/// Angle in rad by which the image seems shifted from which on the geometry counts as wrong.
-const GEOMETRY_OFF: f64 = 0.02;
 
 /// Features (4,) of the bands with errors of the geometry: unevenness of the section, shift of the image (2,) in px, and what
 /// else the feature model errs (4,) in px.
@@ -77,9 +75,7 @@ impl BandProfile for Best {
             rest,
         ];
         state_estimator(&settings.dofs())?;
-        let focal = settings.camera.fx.min(settings.camera.fy);
-        let off = GEOMETRY_OFF * focal;
-        Self::with_geometry(&settings.of_loop()?, limits, geometry, SLACK_CHANGED, off)
+        Self::with_geometry(&settings.of_loop()?, limits, geometry, SLACK_CHANGED)
     }
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(

@@ -26,7 +26,7 @@ use crate::supervision::prediction_monitor::PredictionMonitor;
 pub const ERRORS: usize = GEOMETRY + 4;
 /// Deflection over the half width from which on a DOF counts as in contact.
 const CONTACT: f64 = 0.9;
-/// Shift of the image over its standard deviation from which on the geometry counts as wrong.
+/// Shift of the image, over its standard deviation before and after the images, from which on the geometry counts as wrong.
 const CERTAIN: f64 = 3.0;
 /// Standard deviation by which an image without markers makes the tip less certain, in `start_deviation`.
 const MISS: f64 = 0.03;
@@ -63,8 +63,6 @@ pub struct Best<
     pub(super) dofs: [DofSettings; N],
     limits: [PlayLimit; N],
     prediction: PredictionMonitor<N>,
-    /// Shift of the image in px from which on the geometry counts as wrong.
-    geometry_off: f64,
 }
 
 impl<const N: usize, const M: usize, const G: usize, const D: usize> Law<N> for Best<N, M, G, D> {
@@ -206,8 +204,8 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
 }
 
 impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, G, D> {
-    /// The profile at rest, with the limits of the offsets, errors of the geometry, limits of the low-passed error of the
-    /// predicted tip in units, and the shift of the image in px from which on the geometry counts as wrong.
+    /// The profile at rest, with the limits of the offsets, errors of the geometry, and limits of the low-passed error of the
+    /// predicted tip in units.
     ///
     /// # Errors
     /// A setting is out of range.
@@ -216,7 +214,6 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
         limits: [PlayLimit; N],
         geometry: [GeometryPrior; G],
         slack_changed: [f64; N],
-        geometry_off: f64,
     ) -> Result<Self, ConfigError> {
         let transmission = settings.transmission()?;
         let dofs = settings.dofs;
@@ -252,7 +249,6 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
             dofs,
             limits,
             prediction: PredictionMonitor::new(slack_changed, transmission.unit()),
-            geometry_off,
         })
     }
 
@@ -278,14 +274,15 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
         plays
     }
 
-    /// Whether the shift of the image is larger than its limit, and than what images leave uncertain.
+    /// Whether the shift of the image is larger than what is told of the camera leaves open, and than what images do.
     fn is_geometry_off(&self) -> bool {
         let (mean, std) = self.estimate.geometry();
         let ([_, u, v, ..], [_, u_std, v_std, ..]) = (&mean[..], &std[..]) else {
             return false;
         };
         let shift = libm::hypot(*u, *v);
-        shift > self.geometry_off && shift > CERTAIN * libm::hypot(*u_std, *v_std)
+        let told = self.settings.image_deviation;
+        shift > CERTAIN * told.max(libm::hypot(*u_std, *v_std))
     }
 
     /// The contacts in which each DOF was: there an image measures an offset.

@@ -2,6 +2,7 @@
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
+use crate::dof::zip_with;
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
 use crate::r#loop::any_loop::BandLoop;
@@ -101,7 +102,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let is_missing = self.is_missing(measurement.observable);
+        let is_missing = self.is_missing(past.travel, measurement.observable);
         let is_missed = [is_missing || I::IS_WHOLE, is_missing];
         let (status, triggers) = self.accept(&past, &measurement, is_missed, raised);
         Outcome {
@@ -137,17 +138,17 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         }
     }
 
-    /// Whether no measurement has determined a DOF for so long that its sensor counts as silent.
-    fn is_missing(&mut self, observable: [bool; N]) -> bool {
-        let now = self.history.newest_time();
-        let mut is_missing = false;
-        for (at, is_observable) in self.determined_at.iter_mut().zip(observable) {
-            if is_observable || *at == f64::NEG_INFINITY {
-                *at = now;
+    /// Whether no measurement has determined a DOF while it may have moved far (N,) [m or rad].
+    fn is_missing(&mut self, travel: [f64; N], observable: [bool; N]) -> bool {
+        for ((at, travel), is_observable) in
+            self.determined_at.iter_mut().zip(travel).zip(observable)
+        {
+            if is_observable || at.is_nan() {
+                *at = travel;
             }
-            is_missing |= self.monitors.is_gap(now - *at);
         }
-        is_missing
+        let unseen = zip_with(travel, self.determined_at, |travel, at| travel - at);
+        self.monitors.is_far(unseen)
     }
 
     /// Updates the estimates from a measurement that has passed the checks.

@@ -22,7 +22,7 @@ pub struct HysteresisReduction<P, S = [Entry; 256], V = FeatureModel, const N: u
     pub(super) monitors: Monitors<N>,
     /// Time of capture of the last measurement of each sensor that was used.
     pub(super) last_used: [f64; SENSORS],
-    /// Time of arrival of the last measurement that determined each DOF, of the first one before there is one.
+    /// Travel [m or rad] at the last measurement that determined each DOF, at the first one before there is one.
     pub(super) determined_at: [f64; N],
     travel: [f64; N],
 }
@@ -62,7 +62,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             history: History::new(control.history, control.period, storage)?,
             monitors,
             last_used: [f64::NEG_INFINITY; SENSORS],
-            determined_at: [f64::NEG_INFINITY; N],
+            determined_at: [f64::NAN; N],
             travel: [0.0; N],
         })
     }
@@ -109,7 +109,6 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         });
         if clock_went_back {
             self.last_used = [f64::NEG_INFINITY; SENSORS];
-            self.determined_at = [f64::NEG_INFINITY; N];
         }
         self.profile.keep_up(&self.history, clock_went_back);
         command

@@ -53,7 +53,7 @@ flags! {
     Merged = "merged",
     /// Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     Lost = "lost",
-    /// What was measured does not determine every degree of freedom.
+    /// A degree of freedom has moved without a measurement that determines it.
     Unobservable = "unobservable",
     /// The rig reports that a drive does not follow its command.
     FollowingError = "following_error",
@@ -71,9 +71,9 @@ flags! {
     DriveFault = "drive_fault",
     /// The rig reports that the tip does not follow its command in sign or scale.
     StartCheck = "start_check",
-    /// The estimated slack reached `width_limit` or `offset_limit`.
+    /// The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     WidthLimit = "width_limit",
-    /// The command limiter changed a command.
+    /// A limit of travel, speed or actuators changed a command, or the software is wrong.
     Monitor = "monitor",
     /// A command would have moved faster than `command_speed`.
     CommandJump = "command_jump",
@@ -85,7 +85,7 @@ flags! {
     LimitCycle = "limit_cycle",
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = "slack_changed",
-    /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
+    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     GeometryOff = "geometry_off",
     /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
     FrameRate = "frame_rate",

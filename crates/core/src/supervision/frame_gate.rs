@@ -69,12 +69,7 @@ impl<const N: usize> FrameGate<N> {
     /// Check at a control tick that frames arrive. None is missing before the first.
     pub fn check_gap(&self, time: f64) -> Flags {
         let gap = self.arrived_at.map_or(0.0, |last| time - last);
-        Flags::when(self.is_gap(gap), Flag::Dropped)
-    }
-
-    /// Whether a time without a frame, in s, is so long that the camera counts as lost.
-    pub const fn is_gap(&self, gap: f64) -> bool {
-        gap > self.settings.frame_gap
+        Flags::when(gap > self.settings.frame_gap, Flag::Dropped)
     }
 
     /// Check the times and the image of a frame, before its features.

@@ -17,6 +17,8 @@ use crate::supervision::supervisor::{Event, Supervision, Supervisor};
 
 /// Sensors that a loop may have, each with its own rate and delay.
 pub const SENSORS: usize = 4;
+/// Travel of a DOF, in `width_limit`, in which a measurement should have determined it.
+const UNSEEN: f64 = 0.25;
 
 /// The law of N DOFs, as far as supervision wraps it.
 pub trait Law<const N: usize> {
@@ -170,11 +172,12 @@ impl<const N: usize> Monitors<N> {
                     };
                 }
             }
-            let jump = Flags::when(result == LimiterResult::Jump, Flag::CommandJump);
-            event.raised = event
-                .raised
-                .union(Flags::of(Flag::Monitor))
-                .union(jump.difference(self.off));
+            let found = match result {
+                LimiterResult::LeadLimited => Flags::of(Flag::WidthLimit),
+                LimiterResult::Jump => Flags::of(Flag::Monitor).union(Flags::of(Flag::CommandJump)),
+                _ => Flags::of(Flag::Monitor),
+            };
+            event.raised = event.raised.union(self.enabled(found));
             if result == LimiterResult::Violation {
                 event.severe = event.severe.union(Flags::of(Flag::Monitor));
             }
@@ -220,10 +223,10 @@ impl<const N: usize> Monitors<N> {
         gate.check_innovation(distance)
     }
 
-    /// Whether a time without a measurement, in s, is so long that a sensor counts as lost.
-    pub(crate) const fn is_gap(&self, gap: f64) -> bool {
-        let [gate, ..] = &self.frames;
-        gate.is_gap(gap)
+    /// Whether a travel (N,) [m or rad] is so long that a DOF should have been measured meanwhile.
+    pub(crate) fn is_far(&self, travel: [f64; N]) -> bool {
+        let mut dofs = travel.iter().zip(self.unit);
+        dofs.any(|(travel, unit)| *travel > UNSEEN * unit)
     }
 
     fn check_gap(&self, time: f64) -> Flags {

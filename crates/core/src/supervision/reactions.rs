@@ -64,6 +64,7 @@ use Source::{Frame, Rig, Tick};
 
 const HOLD_THEN_FADE: &[(Reaction, Clear)] = &[(HoldEstimate, Auto), (Fade, Auto)];
 const WARN: &[(Reaction, Clear)] = &[(Warn, Auto)];
+const WARN_THEN_FADE: &[(Reaction, Clear)] = &[(Warn, Auto), (Fade, Auto)];
 
 const fn rule(
     flag: Flag,
@@ -93,7 +94,7 @@ pub static TABLE: [Rule; 27] = [
     rule(Flag::Innovation,       Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Swapped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Merged,           Frame, &[(Warn, Auto), (HoldEstimate, Auto), (Fade, Auto)], true),
-    rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),
+    rule(Flag::Lost,             Frame, WARN_THEN_FADE,                          true),
     rule(Flag::Unobservable,     Frame, WARN,                                    false),
     rule(Flag::FollowingError,   Rig,   &[(QuickStop, Engage)],                  false),
     rule(Flag::ReferenceJump,    Tick,  &[(HoldMotion, Engage)],                 false),
@@ -107,7 +108,7 @@ pub static TABLE: [Rule; 27] = [
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
     rule(Flag::CommandJump,      Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::Tremor,           Tick,  WARN,                                    false),
-    rule(Flag::Overcompensation, Frame, WARN,                                    false),
+    rule(Flag::Overcompensation, Frame, WARN_THEN_FADE,                          true),
     rule(Flag::LimitCycle,       Frame, &[(Fade, Auto)],                         false),
     rule(Flag::SlackChanged,     Frame, WARN,                                    false),
     rule(Flag::GeometryOff,      Frame, WARN,                                    false),

@@ -50,8 +50,11 @@ impl Run {
     }
 
     fn is_limited(&self) -> bool {
-        let supervision = self.reduction.supervision();
-        supervision.latched.contains(Flag::Monitor)
+        self.has(Flag::Monitor)
+    }
+
+    fn has(&self, flag: Flag) -> bool {
+        self.reduction.supervision().latched.contains(flag)
     }
 }
 
@@ -100,7 +103,7 @@ fn a_slack_too_wide_for_the_lead_costs_compensation_and_the_tip_stays_with_the_r
     // Moving up, the law would lead by 0.8 * 40; the limit is 30.
     let mut run = Run::begun(0.0, -10.0, 40.0);
     run.go(150.0);
-    assert!(run.is_limited());
+    assert!(run.has(Flag::WidthLimit) && !run.is_limited());
     let (_, first) = run.go(50.0);
     for _ in 0..50 {
         run.go(150.0);

@@ -80,20 +80,29 @@ impl Strokes {
 
 #[test]
 fn compensation_fades_with_motion_and_returns_with_it_once_the_cause_is_gone() {
+    fades_and_returns(Flag::Frozen);
+}
+
+#[test]
+fn overcompensation_that_lasts_fades_compensation_as_a_fault_of_the_images_does() {
+    fades_and_returns(Flag::Overcompensation);
+}
+
+fn fades_and_returns(flag: Flag) {
     let play = |unit: f64| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
     let mut strokes = Strokes::new(article(play));
     let whole = |factor: f64| (factor - 5.0).abs() < 1e-6;
     let none = |factor: f64| (factor - 1.0).abs() < 1e-6;
     assert!(whole(strokes.travel(100, None)));
     // Four widths of 30, and two more to fade.
-    assert!(whole(strokes.travel(100, Some(Flag::Frozen))));
-    strokes.travel(82, Some(Flag::Frozen));
+    assert!(whole(strokes.travel(100, Some(flag))));
+    strokes.travel(82, Some(flag));
     let supervision = strokes.reduction.supervision();
     assert_eq!(
         (supervision.reaction, supervision.lead),
         (Reaction::Fade, 0.0)
     );
-    let factor = strokes.travel(100, Some(Flag::Frozen));
+    let factor = strokes.travel(100, Some(flag));
     assert!(none(factor), "{factor}");
     // Five good frames, then two widths.
     strokes.travel(34, None);
@@ -107,7 +116,7 @@ fn compensation_fades_with_motion_and_returns_with_it_once_the_cause_is_gone() {
     strokes.travel(34, None);
     let supervision = strokes.reduction.supervision();
     assert_eq!(supervision.lead, 1.0);
-    assert_eq!(supervision.latched, Flags::of(Flag::Frozen));
+    assert_eq!(supervision.latched, Flags::of(flag));
     let factor = strokes.travel(100, None);
     assert!(whole(factor), "{factor}");
 }

@@ -4,11 +4,11 @@ use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
 use crate::r#loop::any_loop::{BandLoop as _, Loop as _};
 use crate::r#loop::profile::BandProfile;
-use crate::supervision::flags::Flag;
+use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;
 
 use super::support::loops::{Loop, article, best, model};
-use super::support::{PERIOD, UNITS};
+use super::support::{PERIOD, UNITS, safety};
 
 const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
 /// Once forth and back [s].
@@ -145,4 +145,29 @@ fn a_flag_at_its_last_level_stays() {
             assert_eq!(reaction, Reaction::Fade, "tick {tick}");
         }
     }
+}
+
+/// Images of a straight section do not determine the rotation.
+#[test]
+fn a_dof_that_images_do_not_determine_is_reported_once_it_has_moved_and_not_before() {
+    let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+    let (mut tick, mut reference) = (0_u32, [CENTRES[0], 0.0, 0.0]);
+    let mut go = |by: [f64; 2]| {
+        for _ in 0..400 {
+            reference[0] += by[0] / 400.0;
+            reference[1] += by[1] / 400.0;
+            let time = f64::from(tick) * PERIOD;
+            let command = reduction.step(reference, None, time);
+            if tick.is_multiple_of(8) {
+                let features = model().predict(command).map(|seen| seen.features);
+                reduction.on_features(features, None, time, Some(u64::from(tick)));
+            }
+            tick += 1;
+        }
+        reduction.supervision().flags
+    };
+    let width = safety().width_limit[1];
+    assert_eq!(go([5e-3, 0.0]), Flags::NONE);
+    assert_eq!(go([0.0, 0.2 * width]), Flags::NONE);
+    assert_eq!(go([0.0, 0.1 * width]), Flags::of(Flag::Unobservable));
 }
