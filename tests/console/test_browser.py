@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import time
@@ -22,6 +23,7 @@ from tautscope.config import load_config
 from tautscope.console.paced_rig import PacedRig
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
+from tautscope.loop.safety import REMEDIES, by_urgency
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
@@ -384,16 +386,25 @@ def test_two_tabs_and_a_stop_by_the_one_that_watches(console: RunningConsole, op
     expect(first.locator("#lease")).to_contain_text("you watch", timeout=TIMEOUT)
 
 
-def test_warnings_stay_until_acknowledged(console: RunningConsole, open_page) -> None:
+def test_warnings_stay_until_acknowledged_and_the_most_urgent_says_what_to_do(
+    console: RunningConsole, open_page
+) -> None:
     page = open_page()
     take(page)
     console.control.run.loop.raise_flag("tremor")
     expect(page.locator("#warnings")).to_contain_text("(tremor)", timeout=TIMEOUT)
+    console.control.run.loop.raise_flag("merged")
+    expect(page.locator("#warnings")).to_contain_text("merged", timeout=TIMEOUT)
+    shown = page.locator("#warnings p").inner_text()
+    (first,) = re.findall(r"\((\w+)\)", shown)
+    others = re.findall(r"\w+", shown.partition("Also: ")[2])
+    assert by_urgency([first, *others])[0] == first
+    assert REMEDIES[first][1:] in shown
     wait(lambda: "tremor" not in console.control.run.loop.supervision.flags)
     page.wait_for_timeout(300)
-    expect(page.locator("#warnings")).to_contain_text("(tremor)")
+    expect(page.locator("#warnings")).to_contain_text("tremor")
     page.click("#acknowledge")
-    expect(page.locator("#warnings")).not_to_contain_text("(tremor)", timeout=TIMEOUT)
+    expect(page.locator("#warnings")).not_to_contain_text("tremor", timeout=TIMEOUT)
 
 
 def test_controls_reach_the_loop(console: RunningConsole, open_page) -> None:

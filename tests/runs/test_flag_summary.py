@@ -5,7 +5,7 @@ from drawn import DrawnRig, short_experiment
 from tautscope import axes
 from tautscope.config import Config
 from tautscope.loop.references import SineSequence
-from tautscope.loop.safety import DETECTORS, MEANINGS, Reaction
+from tautscope.loop.safety import DETECTORS, MEANINGS, REMEDIES, Reaction, by_urgency
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording
@@ -54,8 +54,10 @@ def test_every_reaction_has_a_consequence(reaction: Reaction) -> None:
     assert summarise([(reaction, ("lost",))], ("lost",))[0].partition("; ")[2]
 
 
-def test_every_flag_has_a_meaning() -> None:
+def test_every_flag_has_a_meaning_and_a_remedy() -> None:
     assert list(MEANINGS) == list(DETECTORS)
+    assert sorted(REMEDIES) == sorted(DETECTORS)
+    assert by_urgency(("tremor", "drive_fault", "lost")) == ["drive_fault", "lost", "tremor"]
     for name, meaning in MEANINGS.items():
         assert meaning.endswith("."), name
         assert not meaning.startswith("The same,"), f"{name} does not stand alone"

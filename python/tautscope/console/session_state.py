@@ -14,7 +14,7 @@ from tautscope.console.state import (
     show_truth,
     values,
 )
-from tautscope.loop.safety import MEANINGS, Reaction
+from tautscope.loop.safety import Reaction, advice, by_urgency
 
 _EFFECTS = {
     Reaction.HOLD_ESTIMATE: "The slack is held as estimated so far",
@@ -70,7 +70,7 @@ def _add_run(state: State, run: ControlRun) -> None:
         state.width_std = known(2 * hysteresis.width_std)
     supervision = loop.supervision
     state.reaction, state.flags = str(supervision.reaction), supervision.flags
-    state.latched = tuple((name, MEANINGS[name]) for name in supervision.latched)
+    state.latched = tuple((name, advice(name)) for name in by_urgency(supervision.latched))
     state.lead = supervision.lead
     state.late = run.late, run.ticks
     if report is not None:
@@ -99,9 +99,9 @@ def _motion(control: RigControl) -> tuple[str, str]:
 def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
     supervision, program = run.loop.supervision, control.operator.program
     motion = "moving" if control.operator.is_moving else "ready"
-    why = "; ".join(MEANINGS[name] for name in supervision.flags)
+    flags = by_urgency(supervision.flags)
     if supervision.reaction in _EFFECTS:
-        text = f"{_EFFECTS[supervision.reaction]}: {why}"
+        text = f"{_EFFECTS[supervision.reaction]}: {advice(flags[0])}"
         return ("held" if run.is_held else motion), text
     if control.compensation == 0:
         text = "Compensation is off; the command follows the reference"
@@ -111,7 +111,7 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
         text += f"; the log has ended: {run.log.failure}"
     if program is not None:
         text += f"; running: {program.name}"
-    return motion, f"{text}. Warning: {why}" if why else f"{text}."
+    return motion, f"{text}. In force: {', '.join(flags)}." if flags else f"{text}."
 
 
 def _drives(control: RigControl) -> str:

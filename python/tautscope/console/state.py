@@ -135,7 +135,8 @@ class State(Struct):
         width_std: (n,) standard deviations of the slack's width.
         reaction: The supervisor's reaction in force.
         flags: The active flags.
-        latched: The flags since the last acknowledgement, with their meanings.
+        latched: The flags since the last acknowledgement, the most urgent first; each with its
+            meaning and what to do.
         lead: Share of the compensation that the supervisor allows.
         compensation: Share that the operator has chosen.
         profile: The profile of compensation.

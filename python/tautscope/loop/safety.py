@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -18,10 +19,49 @@ DETECTORS: tuple[str, ...] = _core.DETECTORS
 MEANINGS: dict[str, str] = dict(zip(DETECTORS, _core.MEANINGS, strict=True))
 """The meaning of each flag, in one sentence."""
 
-REMEDIES: dict[str, str] = {"geometry_off": "tautscope calibrate geometry finds the geometry"}
-"""What to do about a flag, where a command helps."""
+REMEDIES: dict[str, str] = {
+    "drive_fault": "find the cause at the drives, then enable again",
+    "following_error": "free the instrument, then enable again",
+    "command_jump": "keep the log: the software is wrong",
+    "monitor": "move back from the end of the travel",
+    "reference_invalid": "check the input device, then re-engage",
+    "reference_jump": "let go of the input device, then re-engage",
+    "reference_late": "check the connection of the input device, then re-engage",
+    "late_tick": "close other programs on this computer, then re-engage",
+    "start_check": "check signs and gains of the motors, then re-engage",
+    "limit_cycle": "move more slowly",
+    "dropped": "check the cable of the camera",
+    "frozen": "check the camera",
+    "clock": "check the clock of the camera",
+    "late": "check the load of this computer and the delay of the camera",
+    "duplicate": "check the driver of the camera",
+    "frame_rate": "check the clock and the rate of the camera",
+    "swapped": "look at the image: which band is which",
+    "lost": "bring the bands into the image",
+    "innovation": "look at the image, and rest for a moment",
+    "merged": "bring both bands into the image",
+    "unobservable": "bend the section a little",
+    "overcompensation": "move slowly until the slack is learned",
+    "slack_changed": "move slowly until the slack is learned",
+    "tremor": "scale the motion down",
+    "reference_fast": "move more slowly",
+    "geometry_off": "tautscope calibrate geometry finds the geometry",
+    "width_limit": "safety.width_limit is less than the slack of this instrument",
+}
+"""What to do about each flag, the most urgent first."""
 
 _ROW_STEP = 8
+
+
+def by_urgency(flags: Iterable[str]) -> list[str]:
+    """Flags, the most urgent first."""
+    return sorted(flags, key=list(REMEDIES).index)
+
+
+def advice(flag: str) -> str:
+    """The meaning of a flag and what to do, in two sentences."""
+    remedy = REMEDIES[flag]
+    return f"{MEANINGS[flag]} {remedy[0].upper()}{remedy[1:]}."
 
 
 class Reaction(StrEnum):

@@ -19,6 +19,8 @@ _CONSEQUENCES = {
     Reaction.QUICK_STOP: "the motors were stopped",
     Reaction.DISABLE: "the motors were disabled",
 }
+_AFTERWARDS = ("geometry_off", "width_limit")
+"""Flags whose remedy helps after the run."""
 
 
 @dataclass
@@ -72,7 +74,7 @@ class FlagSummary:
     def _line(self, name: str) -> str:
         meaning = MEANINGS[name].rstrip(".").replace("`", "")
         flag = f"{name} ({meaning[0].lower()}{meaning[1:]})"
-        remedy = f"; {REMEDIES[name]}" if name in REMEDIES else ""
+        remedy = f"; {REMEDIES[name]}" if name in _AFTERWARDS else ""
         if name == "monitor" and self._limited:
             remedy = f"; {', '.join(self._limited)}"
         count = self._counts.get(name)

@@ -185,13 +185,9 @@ function showWarnings() {
   if (now === latched) return;
   if (now.length > latched.length) sound.play("warning");
   latched = now;
-  $("latched").replaceChildren(
-    ...state.latched.map(([name, meaning]) => {
-      const item = document.createElement("li");
-      item.textContent = `${meaning} (${name})`;
-      return item;
-    }),
-  );
+  const [first, ...others] = state.latched;
+  $("latched").textContent = first ? `${first[1]} (${first[0]})` : "";
+  $("others").textContent = others.length ? `Also: ${others.map(([name]) => name).join(", ")}.` : "";
   $("warnings").hidden = state.latched.length === 0;
 }
 
