@@ -23,6 +23,10 @@ const BENT_SHARE: f64 = 0.4;
 const GAIN_DEVIATION: f64 = 0.3;
 /// Images over which Birge's ratio is averaged.
 const RECENT: f64 = 8.0;
+/// Travel in units between two images from which on their errors are independent: images of a still scene err alike.
+const STILL: f64 = 0.02;
+/// Least share of its information that an image has.
+const LEAST: f64 = 0.001;
 
 /// Normally distributed coefficients of the plays of N DOFs, and G errors of the geometry: D = N `COEFFICIENTS` + G.
 ///
@@ -46,6 +50,8 @@ pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     memory: [f64; G],
     /// Travel of the command at the last image.
     travel: f64,
+    /// Travel since the last update.
+    moved: f64,
     /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
     pub ratio: f64,
 }
@@ -110,6 +116,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             origin: [f64::NAN; N],
             memory: geometry.map(|own| own.travel),
             travel: 0.0,
+            moved: STILL,
             ratio: 1.0,
         })
     }
@@ -149,6 +156,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             return;
         }
         self.travel = travel;
+        self.moved += passed;
         let settings = &self.settings;
         let keep = |memory: f64| libm::exp(-passed / memory);
         let mut shares = SVector::<f64, D>::repeat(keep(settings.weight_travel));
@@ -204,7 +212,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Updates the coefficients with a linear measurement at plays; with `is_position_only` the offsets alone.
     ///
     /// A measurement whose squared Mahalanobis `distance` is above the M that are expected has a variance larger by as much
-    /// (Birge's ratio).
+    /// (Birge's ratio). So has one of a scene that has hardly moved since the last update.
     pub fn update<const M: usize>(
         &mut self,
         plays: &Plays<N>,
@@ -237,6 +245,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         #[expect(clippy::cast_precision_loss, reason = "a few features")]
         let variance = (distance * distance / M as f64).max(1.0);
         self.ratio += (variance - self.ratio) / RECENT;
+        let variance = variance / (self.moved / STILL).clamp(LEAST, 1.0);
+        self.moved = 0.0;
         let value = measurement.value - measurement.by_state * SVector::from(self.origin);
         self.kalman.update(&rows, &cross, &value, variance, only);
         self.bound_gains();

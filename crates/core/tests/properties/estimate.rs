@@ -109,6 +109,27 @@ fn commands(random: &mut Random, targets: u32) -> Vec<f64> {
     all
 }
 
+/// Images of a still scene err alike: thousands of them say little more than one.
+#[test]
+fn a_tip_that_is_measured_wrongly_at_rest_hardly_moves_the_estimate() {
+    let (mut truth, mut random) = (Truth::new(0.7, 0.0, 1.0), Random(11));
+    let mut direct = Direct::new();
+    let (mut command, mut tip) = (ORIGIN, ORIGIN);
+    for to in commands(&mut random, 30) {
+        command = to;
+        tip = truth.step(command);
+        direct.step(command);
+        direct.update(tip, false);
+    }
+    let before = direct.step(command);
+    for _ in 0..3000 {
+        direct.step(command);
+        direct.update(tip + 0.1 * UNIT, false);
+    }
+    let moved = (direct.step(command) - before) / UNIT;
+    assert!((0.0..0.03).contains(&moved), "{moved} of 0.1 units");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..config() })]
 
