@@ -392,7 +392,7 @@ def test_warnings_stay_until_acknowledged_and_the_most_urgent_says_what_to_do(
     page = open_page()
     take(page)
     console.control.run.loop.raise_flag("tremor")
-    expect(page.locator("#warnings")).to_contain_text("(tremor)", timeout=TIMEOUT)
+    expect(page.locator("#warnings")).to_contain_text("tremor", timeout=TIMEOUT)
     console.control.run.loop.raise_flag("merged")
     expect(page.locator("#warnings")).to_contain_text("merged", timeout=TIMEOUT)
     shown = page.locator("#warnings p").inner_text()
