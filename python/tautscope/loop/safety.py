@@ -27,8 +27,8 @@ REMEDIES: dict[str, str] = {
     "reference_invalid": "check the input device, then re-engage",
     "reference_jump": "let go of the input device, then re-engage",
     "reference_late": "check the connection of the input device, then re-engage",
-    "late_tick": "close other programs on this computer, then re-engage",
-    "start_check": "check signs and gains of the motors, then re-engage",
+    "late_tick": "close other programs on this computer",
+    "start_check": "check the signs and gains of the motors, then re-engage",
     "limit_cycle": "move more slowly",
     "dropped": "check the cable of the camera",
     "frozen": "check the camera",
@@ -36,7 +36,7 @@ REMEDIES: dict[str, str] = {
     "late": "check the load of this computer and the delay of the camera",
     "duplicate": "check the driver of the camera",
     "frame_rate": "check the clock and the rate of the camera",
-    "swapped": "look at the image: which band is which",
+    "swapped": "look in the image which band is which",
     "lost": "bring the bands into the image",
     "innovation": "look at the image, and rest for a moment",
     "merged": "bring both bands into the image",
@@ -45,10 +45,10 @@ REMEDIES: dict[str, str] = {
     "slack_changed": "move slowly until the slack is learned",
     "tremor": "scale the motion down",
     "reference_fast": "move more slowly",
-    "geometry_off": "tautscope calibrate geometry finds the geometry",
-    "width_limit": "safety.width_limit is less than the slack of this instrument",
+    "geometry_off": "run tautscope calibrate geometry",
+    "width_limit": "raise safety.width_limit if the instrument has more slack",
 }
-"""What to do about each flag, the most urgent first."""
+"""What to do about each flag, as a phrase that begins with a verb; the most urgent first."""
 
 _ROW_STEP = 8
 
