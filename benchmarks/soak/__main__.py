@@ -1,4 +1,4 @@
-"""Tracking error over two hours of strokes shorter and longer than the slack.
+"""Tracking error over two hours of strokes shorter and longer than the slack, and of rests.
 
 On ideal plays, on the twin, and on the twin with faults of the images. Every tenth of a
 run is judged by itself. `--write` updates docs/soak.md.
@@ -24,6 +24,7 @@ from tautscope.commands.printing import progress_bar
 
 STROKES = (0.3, 0.6, 1.0, 2.0)
 """Over the width of the slack."""
+STROKES_WITH_RESTS = (1.0,)
 SECONDS = 7200.0
 FIRST_SEED, SEEDS = 700, 1
 PAGE = ROOT / "docs" / "soak.md"
@@ -54,7 +55,7 @@ def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
         Case(plant, motion, stroke, seed, options.seconds)
         for plant in options.plant or PLANTS
         for motion in options.motion or MOTIONS
-        for stroke in options.stroke or STROKES
+        for stroke in options.stroke or (STROKES_WITH_RESTS if motion == "rests" else STROKES)
         for seed in range(options.first_seed, options.first_seed + options.seeds)
     ]
     # The longest runs first.

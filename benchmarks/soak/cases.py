@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,6 +33,9 @@ SAMPLE_EVERY = 1.0
 """Time between two comparisons of the intervals with the truth [s]."""
 LEAST_VISIBLE = 0.5
 """A band is measured if at least this share of it is visible."""
+REPEATED, REPEATED_WAVE = 0.5, 30.0
+"""Of a motion with rests: amplitude and length of an error of the images that is the same wherever
+the bands are the same, as a detection's is [px]."""
 FAULT_EVERY = 60.0
 """One fault of the images begins in each such time [s]."""
 IMAGE_FAULTS = tuple(
@@ -49,7 +52,8 @@ class Case:
     Attributes:
         plant: Independent ideal plays; the twin with its true features and noise; or the twin
             with a fault of the images in every minute.
-        motion: ``sines``, or ``hand``, an operator's motion.
+        motion: ``sines``; ``hand``, an operator's motion; or ``rests``, the same with rests, and
+            with an error of the images that is the same in all images of a rest.
         stroke: Longest stroke over the width of the slack.
         seed: Of noise and motion.
         seconds: Duration [s].
@@ -88,7 +92,7 @@ def simulate(case: Case) -> Outcome:
     config = load_config().replace(**{"twin.seed": case.seed})
     reference = make_reference(config, case.motion, case.stroke, case.seed, case.seconds)
     rig, loop = _make_rig(case, config), HysteresisReduction(config)
-    noise = np.random.default_rng([case.seed, 1])
+    look = _Look(case)
     squares, counts = np.zeros((PARTS, 3)), np.zeros(PARTS)
     images = held = 0
     coverage = _Coverage()
@@ -103,7 +107,7 @@ def simulate(case: Case) -> Outcome:
         squares[part] += (sample.true_state - desired) ** 2
         counts[part] += 1
         if sample.frame is not None:
-            _update(loop, sample.frame, noise)
+            look(loop, sample.frame)
             images += 1
             if _is_held(loop):
                 held += 1
@@ -140,16 +144,30 @@ def draw_faults(case: Case) -> list[Fault]:
     ]
 
 
-def _update(loop: HysteresisReduction, frame: Frame, noise: np.random.Generator) -> None:
-    if isinstance(frame, FeatureFrame):
-        with suppress(TautscopeError):  # the supervision reports it as well
-            update_from_features(loop, frame)
-        return
-    assert frame.true_features is not None and frame.true_visible is not None
-    is_visible = frame.true_visible >= LEAST_VISIBLE
-    features = full_size(frame.true_features) + NOISE * noise.standard_normal(4)
-    features[~np.repeat(is_visible, 2)] = np.nan
-    loop.on_features(features if is_visible.any() else None, frame.captured_at)
+class _Look:
+    """The image update: features with noise, and with rests an error that repeats."""
+
+    def __init__(self, case: Case) -> None:
+        self._noise = np.random.default_rng([case.seed, 1])
+        self._repeats = case.motion == "rests"
+
+    def __call__(self, loop: HysteresisReduction, frame: Frame) -> None:
+        if isinstance(frame, FeatureFrame):
+            repeated = replace(frame, features=frame.features + self._repeated(frame.features))
+            with suppress(TautscopeError):  # the supervision reports it as well
+                update_from_features(loop, repeated)
+            return
+        assert frame.true_features is not None and frame.true_visible is not None
+        is_visible = frame.true_visible >= LEAST_VISIBLE
+        features = full_size(frame.true_features)
+        features += self._repeated(features) + NOISE * self._noise.standard_normal(4)
+        features[~np.repeat(is_visible, 2)] = np.nan
+        loop.on_features(features if is_visible.any() else None, frame.captured_at)
+
+    def _repeated(self, features: Floats) -> Floats:
+        if not self._repeats:
+            return np.zeros(4)
+        return np.asarray(REPEATED * np.sin(features / REPEATED_WAVE + np.arange(4)))
 
 
 def _is_held(loop: HysteresisReduction) -> bool:

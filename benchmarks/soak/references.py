@@ -13,14 +13,16 @@ from tautscope.dof import Dof
 from tautscope.loop.references import OperatorMotion, Reference, Segment
 
 Floats = NDArray[np.float64]
-Motion = Literal["sines", "hand"]
-MOTIONS: tuple[Motion, ...] = ("sines", "hand")
+Motion = Literal["sines", "hand", "rests"]
+MOTIONS: tuple[Motion, ...] = ("sines", "hand", "rests")
 PARTS = 10
 """Parts of a run of equal duration, each judged by itself."""
 RATES = np.array([0.8, 0.63, 0.5])
 """Angular frequencies of the sines [rad/s]."""
 RETURN = 5.0
 """Duration of the return to the first position at the end of each part [s]."""
+MOVING, RESTING, EASING = 20.0, 36.0, 4.0
+"""With rests: time of moving and of resting in turn, and of easing in and out of a rest [s]."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,35 @@ class RepeatedMotion:
         return last + (first - last) * x**3 * (10 - 15 * x + 6 * x**2)
 
 
+@dataclass(frozen=True)
+class RestingMotion:
+    """A motion that is made for `MOVING` and stands for `RESTING`, again and again; a `Reference`.
+
+    Its clock slows down evenly within `EASING` before a rest and speeds up after it.
+
+    Attributes:
+        motion: The motion; between two rests it goes on by `MOVING`.
+        duration: [s].
+    """
+
+    motion: Reference
+    duration: float
+    segments: ClassVar[tuple[Segment, ...]] = ()
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
+        count, phase = divmod(time, MOVING + RESTING + EASING)
+        # Easing takes twice the time of the part of the motion that it makes.
+        begins, ends = EASING / 2, MOVING - EASING / 2
+        if phase < EASING:
+            own = phase**2 / (2 * EASING)
+        else:
+            own = begins + min(phase - EASING, ends - begins)
+            eased = min(max(phase - EASING - (ends - begins), 0.0), EASING)
+            own += eased - eased**2 / (2 * EASING)
+        return self.motion(count * MOVING + own)
+
+
 def make_reference(
     config: Config, motion: Motion, stroke: float, seed: int, seconds: float
 ) -> Reference:
@@ -74,7 +105,8 @@ def make_reference(
 
     Args:
         config: `experiment` has the centres.
-        motion: ``sines``, or ``hand``, an operator's motion that repeats in every part.
+        motion: ``sines``; ``hand``, an operator's motion that repeats in every part; or
+            ``rests``, the same with rests.
         stroke: Longest travel between two turning points, over the width of the slack in the
             article's Table 1: the amplitude is this many half widths.
         seed: Of the operator's motion.
@@ -89,4 +121,8 @@ def make_reference(
         for dof, value in zip(Dof, amplitude, strict=True)
     }
     experiment = config.replace(**changes).experiment
-    return RepeatedMotion(OperatorMotion(experiment, seed, seconds / PARTS), seconds)
+    if motion == "hand":
+        return RepeatedMotion(OperatorMotion(experiment, seed, seconds / PARTS), seconds)
+    moving = seconds * MOVING / (MOVING + RESTING + EASING)
+    repeated = RepeatedMotion(OperatorMotion(experiment, seed, moving / PARTS), moving)
+    return RestingMotion(repeated, seconds)

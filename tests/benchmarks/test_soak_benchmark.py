@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,14 +14,28 @@ from soak.cases import (
     FAULT_EVERY,
     IMAGE_FAULTS,
     PLANTS,
+    REPEATED,
     Case,
     Outcome,
     PlantName,
     _Coverage,
+    _Look,
     draw_faults,
     simulate,
 )
-from soak.references import MOTIONS, PARTS, RETURN, Motion, make_reference
+from soak.endurance import run_session
+from soak.endurance import table as endurance_table
+from soak.references import (
+    EASING,
+    MOVING,
+    PARTS,
+    RESTING,
+    RETURN,
+    Motion,
+    RestingMotion,
+    SteadySines,
+    make_reference,
+)
 from soak.rows import table, to_rows
 from tautscope.config import load_config
 from tautscope.dof import Dof
@@ -35,7 +50,7 @@ def positions(motion: Motion, stroke: float) -> NDArray[np.float64]:
     return np.array([reference(time) for time in np.arange(0, SECONDS, INTERVAL)])
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", ["sines", "hand"])
 def test_the_longest_stroke_is_a_multiple_of_the_slack(motion: Motion) -> None:
     found = positions(motion, 0.6)
     np.testing.assert_allclose(found[0], CENTRE, atol=1e-12)
@@ -50,6 +65,44 @@ def test_an_operators_motion_is_the_same_in_every_part() -> None:
     np.testing.assert_allclose(parts, np.broadcast_to(parts[0], parts.shape), atol=1e-9)
     last = round(RETURN / INTERVAL)
     assert np.ptp(parts[0][-last:], axis=0).max() > 0
+
+
+def test_a_motion_with_rests_is_the_motion_with_a_clock_that_stands() -> None:
+    moving = SteadySines(CENTRE, HALF, SECONDS)
+    resting = RestingMotion(moving, SECONDS)
+    cycle = MOVING + RESTING + EASING
+    times = np.arange(0, 2 * cycle, INTERVAL)
+    found = np.array([resting(time) for time in times])
+    speed = np.abs(np.diff(found, axis=0)).max(axis=1) / INTERVAL
+    rests = times[1:] % cycle >= MOVING + EASING + INTERVAL
+    assert np.all(speed[rests] == 0)
+    rates = np.array([0.8, 0.63, 0.5])
+    assert np.all(np.abs(np.diff(found, axis=0)) <= HALF * rates * INTERVAL)
+    np.testing.assert_allclose(resting(cycle), moving(MOVING), atol=1e-12)
+    own_clock = np.interp(times % cycle, [EASING, MOVING], [EASING / 2, MOVING - EASING / 2])
+    at_full_speed = (times % cycle >= EASING) & (times % cycle <= MOVING)
+    expected = [
+        moving(own + MOVING * (time // cycle)) for time, own in zip(times, own_clock, strict=True)
+    ]
+    np.testing.assert_allclose(found[at_full_speed], np.array(expected)[at_full_speed], atol=1e-12)
+
+
+def test_in_all_images_of_a_rest_the_error_repeats() -> None:
+    look = _Look(Case("plays", "rests", 1.0, 0, 60.0))
+    features = np.array([100.0, 200.0, 300.0, 150.0])
+    error = look._repeated(features)
+    np.testing.assert_array_equal(error, look._repeated(features))
+    assert 0 < np.abs(error).max() <= REPEATED
+    assert not _Look(Case("plays", "hand", 1.0, 0, 60.0))._repeated(features).any()
+
+
+def test_sessions_of_the_whole_loop_are_alike_and_lose_nothing(tmp_path: Path) -> None:
+    first, second = (run_session(CONFIG, 4.0, tmp_path) for _ in range(2))
+    assert first.ticks == first.in_log == 4.0 / CONFIG.control.period
+    assert first.error == second.error
+    assert (first.descriptors, first.threads) == (second.descriptors, second.threads)
+    assert not list(tmp_path.iterdir())
+    assert "| 2 |" in endurance_table([first, second])
 
 
 @pytest.mark.parametrize("plant", PLANTS)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -151,7 +153,7 @@ class OperatorMotion:
     segments: ClassVar[tuple[Segment, ...]] = ()
 
     @cached_property
-    def _moves(self) -> list[NDArray[np.float64]]:
+    def _moves(self) -> list[list[tuple[float, ...]]]:
         rng = np.random.default_rng(self.seed)
         return [self._draw_moves(sine, rng) for sine in self._sines]
 
@@ -168,9 +170,10 @@ class OperatorMotion:
             return np.array(TREMOR)
         return np.array([TREMOR_SHARE * sine.amplitude for sine in self._sines])
 
-    def _draw_moves(self, sine: Sine, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Moves (n, 4): start [s], D [s], a, b."""
-        time, position, moves = 0.0, sine.centre, []
+    def _draw_moves(self, sine: Sine, rng: np.random.Generator) -> list[tuple[float, ...]]:
+        """Moves, each start [s], D [s], a, b."""
+        moves: list[tuple[float, ...]] = []
+        time, position = 0.0, sine.centre
         while time < self.duration:
             least = rng.uniform(1.0, 4.0)
             target = sine.centre + sine.amplitude * rng.uniform(-1, 1)
@@ -183,13 +186,13 @@ class OperatorMotion:
             lasts = max(least, MINIMUM_JERK_PEAK * abs(target - position) / speed)
             moves.append((time, lasts, position, target))
             time, position = time + lasts + rest, target
-        return np.array(moves)
+        return moves
 
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(n,) [m or rad] at `time` [s from the start of the reference]."""
         position = np.empty(len(self._moves))
         for dof, moves in enumerate(self._moves):
-            index = max(int(np.searchsorted(moves[:, 0], time, side="right")) - 1, 0)
+            index = max(bisect_right(moves, time, key=itemgetter(0)) - 1, 0)
             start, lasts, a, b = moves[index]
             position[dof] = _minimum_jerk(a, b, (time - start) / lasts)
         if self.is_disturbed:

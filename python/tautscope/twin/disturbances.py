@@ -102,7 +102,7 @@ class Disturbances:
 
     def apply_to_background(self, background: Image, sequence: int) -> Image:
         """Apply those on the tissue to the background image."""
-        if not any(each.stage is Stage.TISSUE for each in self._active):
+        if not self._has(Stage.TISSUE):
             return background
         no_bands = Bands.from_surface(np.empty((0, 5)))
         light = background.astype(np.float32)
@@ -110,12 +110,17 @@ class Disturbances:
 
     def apply_to_scene(self, image: Image, bands: Bands, sequence: int) -> tuple[Image, Mask]:
         """Image on the sensor, before noise, and the mask of occluded pixels."""
+        if not self._has(Stage.SCENE):
+            return image, np.zeros(image.shape[:2], dtype=bool)
         light, hidden = self._run(Stage.SCENE, image.astype(np.float32), bands, sequence)
         return quantize(light), hidden
 
     def apply_to_output(self, image: Image, bands: Bands, sequence: int) -> tuple[Image, Mask]:
         """Image with the overlays of the video processor, and the mask of their pixels."""
         return self._run(Stage.OVERLAY, image, bands, sequence)
+
+    def _has(self, stage: Stage) -> bool:
+        return any(each.stage is stage for each in self._active)
 
     def _run(self, stage: Stage, image: Any, bands: Bands, sequence: int) -> tuple[Any, Mask]:
         hidden = np.zeros(image.shape[:2], dtype=bool)

@@ -44,6 +44,9 @@ class Plant:
         self._timestep = config.control.period / self._substeps
         self._model = mujoco.MjModel.from_xml_string(build(config, self._timestep))
         self._data = mujoco.MjData(self._model)
+        # Views: each look-up of an attribute of MjData makes an array anew.
+        self._q, self._forces = self._data.qpos, self._data.qfrc_applied
+        self._warnings = [self._data.warning[each] for each in _UNSTABLE]
         segments = range(shaft.segments)
         self._slides = self._addresses(f"slide_{i}" for i in segments)
         self._presses = self._addresses(f"press_{i}" for i in segments)
@@ -79,21 +82,21 @@ class Plant:
         """
         data, shaft = self._data, self._config.twin.shaft
         load = shaft.straight_load + shaft.load_per_bend * self.bends
-        data.qfrc_applied[self._presses] = -load * self._load_share
+        self._forces[self._presses] = -load * self._load_share
         if not self._variation.is_constant:
             self._vary_friction()
-        data.qfrc_applied[self._slides[-1]] = self.tip_force
+        self._forces[self._slides[-1]] = self.tip_force
         limit = self._speed_limit * self._timestep
         for _ in range(self._substeps):
             travel = np.minimum(np.maximum(command - self._setpoint, -limit), limit)
             self._setpoint = self._setpoint + travel
             target, travel = self._transmission.step(self._setpoint, travel, self._timestep)
             data.ctrl[:] = target + travel * (SERVO_LAG / self._timestep)
-            angles = data.qpos[self._turns] - shaft.set_angle
-            data.qfrc_applied[self._turns] = -shaft.set_torque * np.sin(angles)
+            angles = self._q[self._turns] - shaft.set_angle
+            self._forces[self._turns] = -shaft.set_torque * np.sin(angles)
             mujoco.mj_step(self._model, data)
         # MuJoCo starts anew when it happens.
-        if any(data.warning[each].number for each in _UNSTABLE):
+        if any([warning.number for warning in self._warnings]):
             when = f"unstable in the simulation at {self._time:.3f} s"
             raise ConfigError(
                 "twin", when, "stiffnesses, masses and friction that can be simulated"
@@ -112,7 +115,7 @@ class Plant:
             self._time,
             (np.hypot(speed[self._slides], around), speed[self._hinges], speed[lumps]),
         )
-        self._data.qfrc_applied[self._presses] *= shaft
+        self._forces[self._presses] *= shaft
         friction = self._section_friction * self._joint_friction
         model.dof_frictionloss[self._hinges] = joints * friction
         model.dof_frictionloss[lumps] = cables * config.twin.cables.friction
@@ -130,14 +133,14 @@ class Plant:
     @property
     def applied(self) -> NDArray[np.float64]:
         """Position (3,) [m, rad, rad] that the encoders measure, in whole counts."""
-        ends = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
+        ends: NDArray[np.float64] = self._q[self._motors]
         position = ends + (self._setpoint - self._transmission.position)
         return self._encoder_step * np.round(position / self._encoder_step)
 
     @property
     def true_state(self) -> NDArray[np.float64]:
         """(3,) [m, rad, rad]: insertion at the guide, plane of bending, angle of the section."""
-        q, plane = self._data.qpos, self._config.twin.cables.plane
+        q, plane = self._q, self._config.twin.cables.plane
         return np.array([q[self._slides[-1]], q[self._turns[-1]] + plane, q[self._hinges].sum()])
 
     def centreline(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -163,7 +166,7 @@ class Plant:
 
     def _start(self) -> None:
         """Set the unstrained start posture and let the instrument settle."""
-        config, q = self._config, self._data.qpos
+        config, q = self._config, self._q
         start = self._setpoint
         insertion, rotation, bending = start
         q[self._slides], q[self._turns] = insertion, rotation
