@@ -87,7 +87,10 @@ class Reaction(StrEnum):
     @property
     def rank(self) -> int:
         """0 to 7."""
-        return list(Reaction).index(self)
+        return _RANKS[self]
+
+
+_RANKS = {reaction: rank for rank, reaction in enumerate(Reaction)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ class AutomaticExposure:
         if not self._share:
             return image
         exposed = cv2.convertScaleAbs(image, alpha=self.gain)
-        mean = max(float(exposed.mean()), 1.0)
+        mean = max(sum(cv2.sumElems(exposed)) / exposed.size, 1.0)
         gain = self.gain * (self._target / mean) ** self._share
         self.gain = min(max(gain, 1 / LARGEST_GAIN), LARGEST_GAIN)
         return np.asarray(exposed, dtype=np.uint8)
