@@ -16,6 +16,11 @@ REAL_TIME = ("console", "hardware", "ros2")
 """Folders of tests with processes, buses and browsers in real time."""
 
 
+def pytest_configure() -> None:
+    """Keep bytecode: else each of hundreds of processes compiles all that it imports."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give tests in real time a second try: a busy computer may miss a deadline that they need.
 
