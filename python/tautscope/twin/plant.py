@@ -96,7 +96,7 @@ class Plant:
             self._forces[self._turns] = -shaft.set_torque * np.sin(angles)
             mujoco.mj_step(self._model, data)
         # MuJoCo starts anew when it happens.
-        if any([warning.number for warning in self._warnings]):
+        if any(warning.number for warning in self._warnings):
             when = f"unstable in the simulation at {self._time:.3f} s"
             raise ConfigError(
                 "twin", when, "stiffnesses, masses and friction that can be simulated"
