@@ -36,8 +36,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--stroke", type=float, action="append", help="only this one, over the slack's width [all]"
     )
-    parser.add_argument("--motion", choices=MOTIONS, action="append", help="only this one [both]")
-    parser.add_argument("--plant", choices=PLANTS, action="append", help="only this one [both]")
+    parser.add_argument("--motion", choices=MOTIONS, action="append", help="only this one [all]")
+    parser.add_argument("--plant", choices=PLANTS, action="append", help="only this one [all]")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
     add_arguments(parser)

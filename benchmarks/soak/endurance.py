@@ -1,4 +1,4 @@
-"""Ten hours of the loop with a restart of everything after each: what grows, and what is lost.
+"""Ten hours of the loop, all made anew after each hour: what grows, and what is lost.
 
 Ideal plays and an operator's motion that is the same in every session; a session makes rig, loop
 and log anew, in the same process. `--write` updates docs/soak.md.
