@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_files import START, joint_state, pose_stamped, write_bag
-from matplotlib.figure import Figure
 from play_model import play
 from refused import failed
 from tautscope import figure_style
 from tautscope.analysis import output
-from tautscope.analysis.comparison import HORIZONS, analyze
+from tautscope.analysis.comparison import HORIZONS
 from tautscope.analysis.models import bouc_wen
 from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
@@ -31,19 +30,6 @@ def _fast() -> Iterator[None]:
         patch.setitem(figure_style._STYLE, "savefig.dpi", 20)
         patch.setattr(bouc_wen, "_STARTS", (15.0,))
         yield
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are composed, but their files are empty."""
-    monkeypatch.setattr(Figure, "savefig", lambda _, file: Path(file).touch())
-
-
-@pytest.fixture
-def brief(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No pictures, and three simple models."""
-    models = tuple(model for model in MODELS if model.name in {"none", "play", "paper"})
-    monkeypatch.setattr(analyze, "__defaults__", (None, None, models))
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +121,7 @@ def test_analyze_prints_a_row_per_model(
     assert "not checked without --time" in text
 
 
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("undrawn", "three_models")
 def test_analyze_takes_a_gain(record: Path, tmp_path: Path) -> None:
     found = analyzed(record, tmp_path / "out", "--gain", "0.9")
     for name in ("none", "play", "paper"):
@@ -158,7 +144,7 @@ def test_a_verdict_comes_first_and_its_fields_are_in_the_document(found: dict[st
     assert width == pytest.approx(1e-3 * dof["width"], rel=1e-5)
 
 
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("undrawn", "three_models")
 def test_a_pure_delay_gets_no_settings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     time = np.arange(2000) * 0.02
@@ -194,7 +180,7 @@ def test_columns_are_listed_and_pairs_proposed(
     assert f"analyze {record} --command motor --measured tip" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("undrawn", "three_models")
 def test_a_tip_of_its_own_file_and_rate(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Motor at 100 Hz, tip at 27 Hz that begins later, in ns since 1970."""
     motor, tip = tmp_path / "motor.csv", tmp_path / "tip.csv"
@@ -304,7 +290,7 @@ def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
 
 
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("undrawn", "three_models")
 def test_a_bag_is_listed_and_analysed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     time = np.arange(600) * 0.1
     motor = 15 * np.sin(2 * np.pi * time / 10)
