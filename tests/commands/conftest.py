@@ -1,4 +1,4 @@
-"""Fixtures of the tests of `tautscope analyze`."""
+"""Shared fixtures: less to draw and to fit."""
 
 from pathlib import Path
 
@@ -11,7 +11,12 @@ from tautscope.analysis.models.registry import MODELS
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are composed, but their files are empty."""
-    monkeypatch.setattr(Figure, "savefig", lambda _, file: Path(file).touch())
+
+    def savefig(_: Figure, file: object, **_options: object) -> None:
+        if isinstance(file, Path):
+            file.touch()
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture
