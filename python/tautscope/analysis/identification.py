@@ -147,13 +147,7 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
     signals = Signals(time, command, measured)
-    delays = signals.longest_delay * np.linspace(-1, 1, 9)
-    grid = [
-        Shape(share * signals.extent, rounding, delay)
-        for delay in delays.tolist()
-        for share in _RADII.tolist()
-        for rounding in ((0.0, 1.0) if share else (0.0,))
-    ]
+    grid = _grid(signals)
     errors, p_value = _surrogate_test(signals, grid)
 
     scale = np.array([signals.extent, 1.0, signals.longest_delay])
@@ -239,6 +233,16 @@ def _extended(
     drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
     output = signals.output(shape, time)
     return weights[0] * output + weights[1] + drift, drift - drift.mean()
+
+
+def _grid(signals: Signals) -> list[Shape]:
+    """Shapes of which the best are refined."""
+    return [
+        Shape(share * signals.extent, rounding, delay)
+        for delay in (signals.longest_delay * np.linspace(-1, 1, 9)).tolist()
+        for share in _RADII.tolist()
+        for rounding in ((0.0, 1.0) if share else (0.0,))
+    ]
 
 
 def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]:
