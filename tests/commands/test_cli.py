@@ -61,7 +61,8 @@ def on_drawn_rig(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def config_file(tmp_path: Path) -> str:
     file = tmp_path / "short.toml"
-    file.write_text(dump_config(short_experiment()), encoding="utf-8")
+    periods = {f"experiment.{dof}.period": 2.5 for dof in ("insertion", "rotation", "bending")}
+    file.write_text(dump_config(short_experiment().replace(**periods)), encoding="utf-8")
     return str(file)
 
 
@@ -102,7 +103,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert 10 < insertion["uncompensated"] < 11
     assert 0.7 < insertion["reduction"] < 0.82
     assert insertion["marker_rms_px"] is None  # this rig has no true features
-    assert found["sim_seconds"] == pytest.approx(4 * (36 + OPERATOR_DURATION), abs=0.1)
+    assert found["sim_seconds"] == pytest.approx(4 * (3 * 3 * 2.5 + OPERATOR_DURATION), abs=0.1)
 
     assert list(found["hand"]) == list(found["dof"])
     for dof in found["hand"].values():
@@ -164,12 +165,9 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
 
 @pytest.mark.usefixtures("on_drawn_rig", "undrawn")
 def test_demo_ends_with_three_sentences_about_both_profiles_and_two_files(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
-    periods = {f"experiment.{dof}.period": 2.5 for dof in ("insertion", "rotation", "bending")}
-    file = tmp_path / "shorter.toml"
-    file.write_text(dump_config(short_experiment().replace(**periods)), encoding="utf-8")
-    arguments = ["demo", "--config", str(file), "--profile", "best"]
+    arguments = ["demo", "--config", config_file, "--profile", "best"]
     assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
     out = capsys.readouterr().out
     table = (tmp_path / "run" / "table1.csv").read_text().splitlines()
