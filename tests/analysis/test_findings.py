@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,11 @@ from tautscope.analysis.verdict import Verdict, judge
 SEEDS = range(2)
 
 
+@cache
+def judged(kind: str, seed: int) -> Verdict:
+    return judge(simulate(kind, seed).record)
+
+
 def assert_found(truth: Simulated, verdict: Verdict, what: str, seed: int) -> None:
     texts = [str(finding) for finding in verdict.findings]
     assert any(what in text for text in texts), (seed, texts)
@@ -25,7 +31,7 @@ def assert_found(truth: Simulated, verdict: Verdict, what: str, seed: int) -> No
 @pytest.mark.parametrize("seed", SEEDS)
 def test_sound_records_have_no_findings(seed: int) -> None:
     for kind in ("play", "rounded", "delay only"):
-        assert judge(simulate(kind, seed).record).findings == (), kind
+        assert judged(kind, seed).findings == (), kind
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -115,7 +121,7 @@ def test_a_curve_is_named_and_a_line_is_not() -> None:
         record = simulate(kind, 3).record
         tip = record.measured - record.measured.mean()
         curved = tip + 0.1 * tip**2 / np.abs(tip).max()
-        assert not any("curve" in str(each) for each in judge(record).findings), kind
+        assert not any("curve" in str(each) for each in judged(kind, 3).findings), kind
         verdict = judge(replace(record, measured=curved))
         assert any("tip: it follows the command in a curve" in str(x) for x in verdict.findings)
 
@@ -129,9 +135,9 @@ def test_nothing_drifts_before_the_fit_begins() -> None:
 
 
 def test_the_next_step_is_that_for_what_is_missing() -> None:
-    few = simulate("play", 0).record  # known to ± 14 %
-    assert re.search(r"record about \d+ strokes in place of \d+", judge(few).text)
-    assert "check that the two columns belong" in judge(simulate("random walk", 0).record).text
+    few = judged("play", 0)  # known to ± 14 %
+    assert re.search(r"record about \d+ strokes in place of \d+", few.text)
+    assert "check that the two columns belong" in judged("random walk", 0).text
     lag = simulate("linear", 2).record
     tip = lfilter([0.05], [1, -0.95], lag.measured - 5)
     verdict = judge(replace(lag, measured=tip))
@@ -187,7 +193,7 @@ def test_a_tip_that_rests_in_the_gap_is_not_frozen() -> None:
 
 def test_units_that_do_not_fit_are_named() -> None:
     record = simulate("play", 0).record
-    gain = judge(record).found.gain
+    gain = judged("play", 0).found.gain
     metres = replace(record, measured=record.measured / gain / 1000, units=("mm", "mm"))
     assert "near the number of mm in 1 m" in judge(metres).text
     degrees = replace(record, measured=record.measured / gain, units=("deg", "mm"))

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from play_model import play
 from records.simulated import UNDETERMINED, WITHOUT_SLACK, simulate
-from tautscope.analysis.identification import Identification, identify
+from tautscope.analysis.delayed_play import Signals
+from tautscope.analysis.identification import (
+    Identification,
+    _grid,
+    _surrogate_test,
+    identify,
+)
 
 SEEDS = range(6)
 WITH_SLACK = ("play", "asymmetric", "rounded", "delay and play", "drift")
@@ -70,10 +76,10 @@ def test_chance_is_as_rare_as_the_surrogate_test_says() -> None:
     for seed in range(15):
         for kind in ("random walk", "two random walks"):
             record = simulate(kind, seed).record
-            short = slice(0, None, 8)
-            values.append(
-                identify(record.clock[short], record.command[short], record.measured[short]).p_value
-            )
+            short = [each[::8] for each in (record.clock, record.command, record.measured)]
+            signals = Signals(*short)
+            values.append(_surrogate_test(signals, _grid(signals))[1])
+    assert values[-1] == identify(*short).p_value
     assert np.count_nonzero(np.array(values) < 0.2) <= 12, sorted(values)
 
 

@@ -25,8 +25,8 @@ def moving(samples: int, strokes: int) -> np.ndarray:
 
 def test_the_width_of_a_long_record_is_that_of_its_turning_points() -> None:
     """Turns that lie between the samples of the fit; the tip is late by 60 samples."""
-    samples = 300_000
-    command = moving(samples, 2000)
+    samples = 100_000
+    command = moving(samples, 667)
     noise = np.random.default_rng(1).normal(0, 0.02, samples)
     tip = np.roll(Play(delta_minus=-1.5, delta_plus=1.5, output=0.0).run(command), 60) + noise
     found = identify(np.arange(float(samples)), command, tip)

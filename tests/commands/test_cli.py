@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from drawn import make_bad_frame_rig, make_drawn_rig, make_stalling_rig, short_experiment
 from refused import failed
+from tautscope import figure_style
 from tautscope.cli import main
 from tautscope.config import dump_config, load_config
-from tautscope.report import demo
+from tautscope.report import demo, film
 from tautscope.report.operator_motion import operator_motion
 from tautscope.report.results import ROWS
 from tautscope.runs.recording import Recording, per_dof
@@ -31,7 +32,7 @@ SUMMARY = [
 ]
 
 
-OPERATOR_DURATION = 50.0
+OPERATOR_DURATION = 20.0
 OPERATOR_FIGURES = [
     "uncompensated_rms",
     "compensated_rms",
@@ -47,6 +48,9 @@ OPERATOR_FIGURES = [
 @pytest.fixture
 def on_drawn_rig(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_drawn_rig))
+    monkeypatch.setattr(film, "SECONDS", 1.0)
+    monkeypatch.setattr(film, "EVALUATED_AFTER", 0.0)
+    monkeypatch.setitem(figure_style._STYLE, "savefig.dpi", 120)
     monkeypatch.setattr(
         demo,
         "operator_motion",
@@ -57,7 +61,8 @@ def on_drawn_rig(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def config_file(tmp_path: Path) -> str:
     file = tmp_path / "short.toml"
-    file.write_text(dump_config(short_experiment()), encoding="utf-8")
+    periods = {f"experiment.{dof}.period": 2.5 for dof in ("insertion", "rotation", "bending")}
+    file.write_text(dump_config(short_experiment().replace(**periods)), encoding="utf-8")
     return str(file)
 
 
@@ -98,7 +103,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert 10 < insertion["uncompensated"] < 11
     assert 0.7 < insertion["reduction"] < 0.82
     assert insertion["marker_rms_px"] is None  # this rig has no true features
-    assert found["sim_seconds"] == pytest.approx(4 * (36 + OPERATOR_DURATION), abs=0.1)
+    assert found["sim_seconds"] == pytest.approx(4 * (3 * 3 * 2.5 + OPERATOR_DURATION), abs=0.1)
 
     assert list(found["hand"]) == list(found["dof"])
     for dof in found["hand"].values():
@@ -158,7 +163,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert float(lines[3].split(",")[6]) == low < high
 
 
-@pytest.mark.usefixtures("on_drawn_rig")
+@pytest.mark.usefixtures("on_drawn_rig", "undrawn")
 def test_demo_ends_with_three_sentences_about_both_profiles_and_two_files(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
@@ -167,14 +172,14 @@ def test_demo_ends_with_three_sentences_about_both_profiles_and_two_files(
     out = capsys.readouterr().out
     table = (tmp_path / "run" / "table1.csv").read_text().splitlines()
     assert {line.split(",")[2] for line in table[1:]} == {"", "paper", "best"}
-    facts, sines, motion, film, report = out.splitlines()
+    facts, sines, motion, film_line, report = out.splitlines()
     assert facts.endswith("(insertion, rotation, bending).")
     slack, left = sines.split("there remain")
     number = r"\S+ mm / \S+ rad / \S+ rad"
     assert len(re.findall(number, slack)) == 1
     assert re.findall(rf"{number} with profile (\w+)", left) == ["paper", "best"]
     assert re.search(r"less by \d+ % / \d+ % / \d+ %\.$", motion)
-    assert film.endswith("film.gif")
+    assert film_line.endswith("film.gif")
     assert report.endswith("report.html")
 
 

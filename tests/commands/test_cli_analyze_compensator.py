@@ -9,18 +9,11 @@ import numpy as np
 import pytest
 from play_model import play
 from tautscope import figure_style
-from tautscope.analysis.comparison import analyze
-from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
 from tautscope.config import load_config
 from tautscope.loop.actuators import Actuators
 
-
-@pytest.fixture(autouse=True)
-def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarse pictures, and three simple models."""
-    monkeypatch.setitem(figure_style._STYLE, "savefig.dpi", 20)
-    monkeypatch.setattr(analyze, "__defaults__", (None, None, MODELS[:3]))
+pytestmark = pytest.mark.usefixtures("three_models")
 
 
 def write_record(file: Path) -> None:
@@ -45,8 +38,9 @@ COLUMNS = ["--command", "motor 1", "motor 2", "motor 3", "--measured", "slide", 
 
 
 def test_several_degrees_of_freedom_get_a_verdict_each_and_one_loop(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setitem(figure_style._STYLE, "savefig.dpi", 20)
     file, out = tmp_path / "log.csv", tmp_path / "out"
     write_record(file)
     assert main(["analyze", str(file), *COLUMNS, "--out", str(out), "--json", "--check"]) == 1
@@ -84,6 +78,7 @@ def test_several_degrees_of_freedom_get_a_verdict_each_and_one_loop(
     assert (compensated < 0.3 * without).all()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_text_names_what_got_a_loop(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file, out = tmp_path / "log.csv", tmp_path / "out"
     write_record(file)
@@ -99,6 +94,7 @@ def test_the_text_names_what_got_a_loop(capsys: pytest.CaptureFixture[str], tmp_
     assert what in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_compensator_names_what_the_record_does_not_know(tmp_path: Path) -> None:
     """No unit, no time, and a tip that is late in a record with time."""
     time = np.arange(2000) * 0.02

@@ -11,9 +11,7 @@ import polars as pl
 import pytest
 from records.lerobot import COLUMNS, MOTORS, TIP, WIDTHS, episode, write
 from refused import failed
-from tautscope import figure_style
 from tautscope.analysis import episodes as of_episodes
-from tautscope.analysis.models import bouc_wen
 from tautscope.cli import main
 from tautscope.runs.episodes import list_episodes, open_episode
 
@@ -78,14 +76,10 @@ def test_workers_do_not_change_the_result(
     assert files[0] == files[1]
 
 
+@pytest.mark.usefixtures("undrawn", "three_models")
 def test_columns_are_listed_and_one_episode_is_analysed(
-    data_set: Path,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    data_set: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setitem(figure_style._STYLE, "savefig.dpi", 20)
-    monkeypatch.setattr(bouc_wen, "_STARTS", (15.0,))
     listed = analyzed(capsys, data_set)
     assert "observation.state.tip_q_turn [rad]" in [each["title"] for each in listed["columns"]]
     assert all(".motor_" in each["command"] for each in listed["pairs"])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tautscope import figure_style
 from tautscope.cli import main
 from tautscope.config import load_config
 from tautscope.errors import CalibrationError
@@ -48,6 +49,11 @@ range = [-1.5, 1.5]
 [kinematics]
 kind = "two_planes"
 """
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(figure_style._STYLE, "savefig.dpi", 80)
 
 
 @pytest.fixture
@@ -169,7 +175,7 @@ def test_the_simulated_colonoscope_is_a_demo(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    options = ["demo", "--robot", "colonoscope", "--seconds", "16", "--out", str(out)]
+    options = ["demo", "--robot", "colonoscope", "--seconds", "10", "--out", str(out)]
     assert main(options) == 0
     text = capsys.readouterr().out
     assert [line.split(":")[0] for line in text.splitlines() if "of the true tip" in line] == [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +32,6 @@ class Shape:
         plays = _PLAYS if self.rounding else np.zeros(1)
         return np.asarray(self.radius * (1 + self.rounding * plays))
 
-    def output(self, times: Floats, time: Floats, command: Floats) -> Floats:
-        """P(c(t - d)) at the times, for a command that is monotonic between its samples."""
-        delayed = np.interp(times - self.delay, time, command)
-        last = np.maximum(np.searchsorted(time, times - self.delay, side="right") - 1, 0)
-        plays = [
-            np.clip(operator(command, each, 0.0)[last], delayed - each, delayed + each)
-            for each in self.half_widths.tolist()
-        ]
-        return np.asarray(np.mean(plays, axis=0))
-
 
 class Signals:
     """Samples of a record for a fit, decimated.
@@ -65,7 +56,7 @@ class Signals:
         duration = float(time[-1] - time[0])
         self.stroke = float(np.median(strokes)) if len(strokes) else duration / 10
         self.longest_delay = max(self.stroke / 2, 1e-9)
-        self.where = fit_samples(command[kept], self.measured)
+        self.where = np.flatnonzero(fit_samples(command[kept], self.measured))
         self.target = self.measured[self.where]
         x = (
             np.linspace(-1, 1, len(kept))
@@ -76,10 +67,26 @@ class Signals:
         x = np.clip(x, fitted[0], fitted[-1])  # a polynomial says nothing outside
         degree = 3 if len(at) >= 12 else 1
         self.drifts = np.polynomial.legendre.legvander(x, degree)
+        # A search varies one parameter at a time, the grid nine delays.
+        self._late = lru_cache(9)(lambda delay: self._delayed(self.time - delay))
+        self._play = lru_cache(len(_PLAYS))(lambda r: operator(self.all_commands, r, 0.0))
 
-    def output(self, shape: Shape) -> Floats:
-        """P(c(t - d)) at the samples."""
-        return shape.output(self.time, self.all_times, self.all_commands)
+    def output(self, shape: Shape, times: Floats | None = None) -> Floats:
+        """P(c(t - d)) at the samples or other times; between its samples c is monotonic."""
+        if times is None:
+            delayed, last = self._late(shape.delay)
+        else:
+            delayed, last = self._delayed(times - shape.delay)
+        plays = [
+            np.minimum(np.maximum(self._play(r)[last], delayed - r), delayed + r)
+            for r in shape.half_widths.tolist()
+        ]
+        return np.asarray(np.mean(plays, axis=0))
+
+    def _delayed(self, at: Floats) -> tuple[Floats, NDArray[np.intp]]:
+        """The command at times, and the last of its samples."""
+        last = np.searchsorted(self.all_times, at, side="right") - 1
+        return np.interp(at, self.all_times, self.all_commands), np.maximum(last, 0)
 
     def columns(self, shape: Shape) -> Floats:
         """Regressors of gain, offset and drift."""

@@ -147,13 +147,7 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
     signals = Signals(time, command, measured)
-    delays = signals.longest_delay * np.linspace(-1, 1, 9)
-    grid = [
-        Shape(share * signals.extent, rounding, delay)
-        for delay in delays.tolist()
-        for share in _RADII.tolist()
-        for rounding in ((0.0, 1.0) if share else (0.0,))
-    ]
+    grid = _grid(signals)
     errors, p_value = _surrogate_test(signals, grid)
 
     scale = np.array([signals.extent, 1.0, signals.longest_delay])
@@ -237,8 +231,18 @@ def _extended(
 ) -> tuple[Floats, Floats]:
     """Output of the model, and drift, at every sample of the record."""
     drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
-    output = shape.output(time, signals.all_times, signals.all_commands)
+    output = signals.output(shape, time)
     return weights[0] * output + weights[1] + drift, drift - drift.mean()
+
+
+def _grid(signals: Signals) -> list[Shape]:
+    """Shapes of which the best are refined."""
+    return [
+        Shape(share * signals.extent, rounding, delay)
+        for delay in (signals.longest_delay * np.linspace(-1, 1, 9)).tolist()
+        for share in _RADII.tolist()
+        for rounding in ((0.0, 1.0) if share else (0.0,))
+    ]
 
 
 def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]:
@@ -247,8 +251,11 @@ def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]
     A surrogate has the increments of the tip, shuffled and with random signs: the tip as a random
     walk. The same search explains it.
     """
-    keep = np.flatnonzero(signals.where)
-    outputs = np.array([signals.output(shape)[keep] for shape in grid])
+    keep = signals.where
+    outputs = np.empty((len(grid), len(keep)))
+    # In this order shapes share the plays of the one before.
+    for k in sorted(range(len(grid)), key=lambda k: (grid[k].radius, grid[k].rounding)):
+        outputs[k] = signals.output(grid[k])[keep]
     base = np.linalg.qr(signals.drifts[keep])[0]
     rng = np.random.default_rng(0)
     target = signals.target
@@ -304,8 +311,7 @@ def _jackknife(signals: Signals, shape: Shape) -> tuple[Interval, Interval]:
     jacobian = np.column_stack([*derivatives, signals.columns(shape)[signals.where]])
     scale = np.linalg.norm(jacobian, axis=0) + 1e-300
     jacobian = jacobian / scale
-    at = np.flatnonzero(signals.where)
-    block = np.searchsorted(_stroke_ends(signals, shape), at)
+    block = np.searchsorted(_stroke_ends(signals, shape), signals.where)
     count = int(block.max()) + 1
     if count > _BLOCKS:
         block = block * _BLOCKS // count
