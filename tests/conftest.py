@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from drawn import DrawnRig, short_experiment
 from tautscope.loop.references import SineSequence
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
+from tautscope.twin import camera, tissue
 
 REAL_TIME = ("console", "hardware", "ros2")
 """Folders of tests with processes, buses and browsers in real time."""
@@ -43,6 +46,21 @@ def shared_data(*parts: str) -> Path:
             pytest.fail(reason)
         pytest.skip(reason)
     return path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _mucosa_drawn_once() -> Iterator[None]:
+    """Twins with the same seed and image size share one background image."""
+
+    @lru_cache(maxsize=64)
+    def draw(width: int, height: int, seed: int) -> tissue.Image:
+        image = tissue.draw_mucosa(width, height, seed)
+        image.flags.writeable = False
+        return image
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(camera, "draw_mucosa", draw)
+        yield
 
 
 @pytest.fixture(scope="session")

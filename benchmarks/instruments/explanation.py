@@ -14,6 +14,7 @@ from tautscope.dof import Dof
 LEAST_SEEDS = 20
 """Fewer say nothing about this many properties."""
 SHOWN = 3
+TREES = 100
 
 
 def explain(rows: list[Row], motion: Motion) -> str:
@@ -38,7 +39,7 @@ def explain(rows: list[Row], motion: Motion) -> str:
     parts = []
     for dof in Dof:
         reduction = 100 * found[:, dof]
-        forest = RandomForestRegressor(100, min_samples_leaf=3, random_state=0)
+        forest = RandomForestRegressor(TREES, min_samples_leaf=3, random_state=0)
         forest.fit(values, reduction)
         importance = permutation_importance(
             forest, values, reduction, n_repeats=5, random_state=0

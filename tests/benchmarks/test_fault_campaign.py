@@ -324,7 +324,10 @@ def test_only_motion_beyond_the_input_error_counts_as_excursion():
 
 
 @needs_fork
-def test_a_detector_without_flags_does_not_influence_the_run():
+def test_a_detector_without_flags_does_not_influence_the_run(monkeypatch):
+    monkeypatch.setattr(scenarios, "ESTIMATION_TIME", 5.0)
+    monkeypatch.setattr(scenarios, "OBSERVED_AFTER", 1.0)
+    monkeypatch.setattr(scenarios, "OBSERVED_PERMANENT", 3.0)
     kinds = ["ok", "duplicate", "band_b_lost"]
     found = runs.run_with_each_off(202, kinds)
     (repeated,) = runs.run_seed(202, ["duplicate"], off=("merged",))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
 
 import pytest
-from common.paths import ROOT
+from faults import runs, scenarios, tables
 
 SEEDS = (200, 201)
 
@@ -44,18 +42,16 @@ EXPECTED_FLAGS = {
 
 
 @pytest.fixture(scope="module")
-def rows(tmp_path_factory):
-    file = tmp_path_factory.mktemp("campaign") / "rows.json"
-    kinds = [
-        word for names, _ in EXPECTED_FLAGS.values() for name in names for word in ("--kind", name)
-    ]
-    runs = str(len(SEEDS) * len(kinds) // 2)
-    command = [sys.executable, "benchmarks/faults", *kinds, "--runs", runs, "--workers", "1"]
-    subprocess.run(
-        [*command, "--first-seed", str(SEEDS[0]), "--json", str(file)], cwd=ROOT, check=True
-    )
-    (found,) = json.loads(file.read_text(encoding="utf-8")).values()
-    return {(row["kind"], row["seed"]): row for row in found}
+def rows():
+    kinds = [name for names, _ in EXPECTED_FLAGS.values() for name in names]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scenarios, "OBSERVED_AFTER", 0.5)
+        patch.setattr(scenarios, "OBSERVED_PERMANENT", 3.0)
+        return {
+            (found.kind, seed): tables.to_row(found)
+            for seed in SEEDS
+            for found in runs.run_seed(seed, kinds)
+        }
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from common.paths import ROOT
 from common.processes import run_parallel
-from instruments import properties, runs
+from instruments import explanation, properties, runs
 from instruments.alarms import alarm_table
-from instruments.explanation import explain
 from instruments.properties import TABLE, draw_instrument, markdown_table
 from instruments.rows import seed_rows, summary_rows, table
 from instruments.runs import Figures, Run, simulate
@@ -204,9 +203,12 @@ def test_a_stopped_run_is_worse_than_none_and_an_unfinished_seed_is_left_out() -
     assert [row["seed"] for row in seed_rows(results)] == [0]
 
 
-def test_the_property_that_matters_is_named() -> None:
+def test_the_property_that_matters_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(explanation, "TREES", 10)
     values = [draw_instrument(seed).values["latency"] for seed in range(40)]
-    text = explain(seed_rows(found({"best": [1 - each / 250 for each in values]})), "hand")
+    text = explanation.explain(
+        seed_rows(found({"best": [1 - each / 250 for each in values]})), "hand"
+    )
     first = re.search(r"rotation: (\S+) \S+ \((\S+)\)", text)
     assert first is not None and first[1] == "latency" and float(first[2]) < -0.95, text
 

@@ -48,8 +48,8 @@ def near_sides(config: Config, points: Array, directions: Array) -> list[tuple[A
     across = np.cross(axis, [0.3, 0.5, 0.8])
     across /= np.linalg.norm(across)
     other = np.cross(axis, across)
-    edge_s = instrument.band_length * np.linspace(-0.5, 0.5, 121)
-    edge_a = np.linspace(0, 2 * np.pi, 721)
+    edge_s = instrument.band_length * np.linspace(-0.5, 0.5, 25)
+    edge_a = np.linspace(0, 2 * np.pi, 241)
     sides = []
     for centre in centres:
         s, a = np.meshgrid(edge_s, edge_a, indexing="ij")
