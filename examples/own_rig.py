@@ -27,7 +27,8 @@ class DrawnRig:
     def __init__(self, config: Config) -> None:
         experiment = config.experiment
         self._model = build_feature_model(config)
-        self._shape = (config.camera.height, config.camera.width, 3)
+        shape = (config.camera.height, config.camera.width, 3)
+        self._tissue = np.full(shape, (60, 60, 150), np.uint8)
         self._home = np.array(
             [experiment.insertion.centre, experiment.rotation.centre, experiment.bending.centre]
         )
@@ -55,7 +56,7 @@ class DrawnRig:
         return Sample(time, applied, frame, self._tip.copy())
 
     def _draw(self) -> NDArray[np.uint8]:
-        image = np.full(self._shape, (60, 60, 150), np.uint8)
+        image = self._tissue.copy()
         for *_, outline in self._model.bands(self._tip) or ():
             corners = np.round(16 * outline).astype(np.int32)
             cv2.fillPoly(image, [corners], (60, 190, 60), cv2.LINE_AA, 4)

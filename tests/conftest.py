@@ -20,8 +20,13 @@ REAL_TIME = ("console", "hardware", "ros2")
 
 
 def pytest_configure() -> None:
-    """Keep bytecode: else each of hundreds of processes compiles all that it imports."""
+    """Set the environment of all processes that the tests start.
+
+    Without bytecode each of hundreds compiles all that it imports; threads of the linear algebra
+    wait for processors that are busy with other tests, and use them while they wait.
+    """
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
