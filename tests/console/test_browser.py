@@ -9,6 +9,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,8 @@ def wait(condition: Callable[[], Any]) -> None:
 
 
 def take(page: Page) -> None:
-    page.click("#take")
+    if page.is_visible("#take"):
+        page.click("#take")
     expect(page.locator("#lease")).to_have_text("You have control.", timeout=TIMEOUT)
     if page.get_attribute("body", "data-motion") == "stopped":
         page.click("#enable")
@@ -189,29 +191,31 @@ PADS = {  # mapping, axes at rest, number of buttons, the button that is B
 }
 
 
-@pytest.mark.parametrize("pad", PADS)
 def test_no_gamepad_moves_anything_by_itself_and_each_stops(
-    console: RunningConsole, open_page, pad: str
+    console: RunningConsole, open_page
 ) -> None:
-    mapping, axes, count, stop = PADS[pad]
     page = open_page(script=GAMEPAD + "navigator.getGamepads = () => [];")
-    take(page)
-    page.evaluate(
-        f"Object.assign(pad, {{mapping: '{mapping}', axes: [{', '.join(map(str, axes))}]}});"
-        f"pad.buttons = Array.from({{length: {count}}}, () => ({{pressed: false}}));"
-        "navigator.getGamepads = () => [null, null, pad]"
-    )
-    before = console.control.operator.reference
-    for held in (4, 5) if mapping else ():  # on any other each button stops
-        page.evaluate(f"pad.buttons[{held}].pressed = true")
-        assert rests(console, 0.3)
-        page.evaluate(f"pad.buttons[{held}].pressed = false")
-    assert (console.control.operator.reference == before).all()
-    assert rests(console, 0.2)
-    assert not console.control.operator.stopped_by
-    page.evaluate(f"pad.buttons[{stop}].pressed = true")
-    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
-    assert (console.control.operator.reference == before).all()
+    operator = console.control.operator
+    for index, (pad, (mapping, axes, count, stop)) in enumerate(PADS.items()):
+        take(page)
+        page.evaluate(
+            f"pad = {{...pad, index: {index}, mapping: '{mapping}'}};"
+            f"pad.axes = [{', '.join(map(str, axes))}];"
+            f"pad.buttons = Array.from({{length: {count}}}, () => ({{pressed: false}}));"
+            "navigator.getGamepads = () => [null, null, pad]"
+        )
+        before = operator.reference
+        for held in (4, 5) if mapping else ():  # on any other each button stops
+            page.evaluate(f"pad.buttons[{held}].pressed = true")
+            assert rests(console, 0.3), pad
+            page.evaluate(f"pad.buttons[{held}].pressed = false")
+        assert (operator.reference == before).all(), pad
+        assert rests(console, 0.2), pad
+        assert not operator.stopped_by, pad
+        page.evaluate(f"pad.buttons[{stop}].pressed = true")
+        expect(page.locator("#motion"), pad).to_have_text("STOPPED", timeout=TIMEOUT)
+        assert (operator.reference == before).all(), pad
+        page.evaluate("navigator.getGamepads = () => []")
 
 
 def test_a_gamepad_that_is_plugged_in_with_its_stick_held_has_to_rest_first(
@@ -233,45 +237,39 @@ def test_a_gamepad_that_is_plugged_in_with_its_stick_held_has_to_rest_first(
     wait(lambda: moves(console))
 
 
-@pytest.mark.parametrize(
-    "control",
-    [
-        "#compensate",
-        "#gain",
-        "[aria-label='scale of bending']",
-        "#profile",
-        "#dofs [type=checkbox]",
-    ],
-)
-def test_keys_steer_after_a_click_on_any_control(
-    console: RunningConsole, open_page, control: str
-) -> None:
+CONTROLS = ("#compensate", "#gain", "[aria-label='scale of bending']", "#profile",
+            "#dofs [type=checkbox]")  # fmt: skip
+
+
+def test_keys_steer_after_a_click_on_any_control(console: RunningConsole, open_page) -> None:
     page = open_page()
-    take(page)
-    element = page.locator(control).first
-    if control == "#profile":
-        element.focus()
-    else:
-        element.click()
-        element.click()
-    wait(lambda: page.evaluate("Boolean(document.activeElement.matches('input, select'))"))
-    page.wait_for_timeout(300)
-    value = element.evaluate("each => [each.value, each.checked]")
-    for key in ("ArrowDown", "ArrowUp", "ArrowRight"):
-        page.keyboard.down(key)
-        wait(lambda: moves(console))
-        page.keyboard.up(key)
-        wait(lambda: not moves(console))
-    assert element.evaluate("each => [each.value, each.checked]") == value
-    if control == "#gain":  # as the other tests expect it; keys that do not steer set it
-        element.press("End")
-        wait(lambda: console.control.compensation == 1)
-    page.focus("#mark")
-    page.keyboard.down("ArrowUp")
-    assert rests(console, 0.2)  # keys write there
-    expect(page.locator("#hint")).to_contain_text("Keys write into the text field")
-    page.keyboard.press("Escape")
-    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+    for control in CONTROLS:
+        take(page)
+        element = page.locator(control).first
+        if control == "#profile":
+            element.focus()
+        else:
+            element.click()
+            element.click()
+        expect(element, control).to_be_focused(timeout=TIMEOUT)
+        page.wait_for_timeout(300)
+        value = element.evaluate("each => [each.value, each.checked]")
+        for key in ("ArrowDown", "ArrowUp", "ArrowRight"):
+            page.keyboard.down(key)
+            wait(lambda: moves(console))
+            page.keyboard.up(key)
+            wait(lambda: not moves(console))
+        assert element.evaluate("each => [each.value, each.checked]") == value, control
+        if control == "#gain":  # as the other tests expect it; keys that do not steer set it
+            element.press("End")
+            wait(lambda: console.control.compensation == 1)
+        page.focus("#mark")
+        page.keyboard.down("ArrowUp")
+        assert rests(console, 0.2), control  # keys write there
+        expect(page.locator("#hint")).to_contain_text("Keys write into the text field")
+        page.keyboard.up("ArrowUp")
+        page.keyboard.press("Escape")
+        expect(page.locator("#motion"), control).to_have_text("STOPPED", timeout=TIMEOUT)
 
 
 @contextmanager
@@ -345,27 +343,27 @@ def test_the_tip_moves_to_a_place_of_the_image_while_it_is_held(
     assert operator.reference[0] == insertion
 
 
-@pytest.mark.parametrize("by", ["Escape", "another page"])
 def test_a_stop_while_the_image_is_held_needs_a_new_press(
-    console: RunningConsole, open_page, by: str
+    console: RunningConsole, open_page
 ) -> None:
     page, other = open_page(), open_page()
     page.bring_to_front()
     take(page)
-    expect(page.locator("#image.offered")).to_be_visible(timeout=TIMEOUT)
-    with holding_image(page, "mouse", 0.1, 0.1):
-        wait(lambda: moves(console))
-        if by == "Escape":
-            page.keyboard.press("Escape")
-        else:
-            other.locator("#stop").dispatch_event("pointerdown")
-        expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
-        expect(page.locator("#image.offered")).to_have_count(0, timeout=TIMEOUT)
-        page.locator("#enable").press("Enter")
-        expect(page.locator("#motion")).to_have_text("READY", timeout=TIMEOUT)
-        assert rests(console)
-    with holding_image(page, "mouse", 0.9, 0.9):
-        wait(lambda: moves(console))
+    for by in ("Escape", "another page"):
+        expect(page.locator("#image.offered")).to_be_visible(timeout=TIMEOUT)
+        with holding_image(page, "mouse", 0.1, 0.1):
+            wait(lambda: moves(console))
+            if by == "Escape":
+                page.keyboard.press("Escape")
+            else:
+                other.locator("#stop").dispatch_event("pointerdown")
+            expect(page.locator("#motion"), by).to_have_text("STOPPED", timeout=TIMEOUT)
+            expect(page.locator("#image.offered")).to_have_count(0, timeout=TIMEOUT)
+            page.locator("#enable").press("Enter")
+            expect(page.locator("#motion")).to_have_text("READY", timeout=TIMEOUT)
+            assert rests(console), by
+        with holding_image(page, "mouse", 0.9, 0.9):
+            wait(lambda: moves(console))
 
 
 def test_two_tabs_and_a_stop_by_the_one_that_watches(console: RunningConsole, open_page) -> None:
@@ -477,16 +475,15 @@ def test_a_killed_browser_stops_motion(console: RunningConsole, open_page, brows
 SIZES = ((1440, 900), (1024, 768), (3840, 2160), (768, 1024), (390, 844), (844, 390), (320, 480))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_stop_is_always_on_top_nothing_is_cut_off_and_axe_finds_no_fault(
-    console: RunningConsole, open_page, scheme: str
+    console: RunningConsole, open_page
 ) -> None:
     page = open_page()
-    page.emulate_media(color_scheme=scheme)
     take(page)
     if AXE.exists():
         page.evaluate(AXE.read_text(encoding="utf-8"))
-    for width, height in SIZES:
+    for scheme, (width, height) in product(("light", "dark"), SIZES):
+        page.emulate_media(color_scheme=scheme)
         page.set_viewport_size({"width": width, "height": height})
         sides = ("right",) if height < 700 or width < 1000 else ()
         assert overflow(page, *sides) == [], (width, height)

@@ -7,13 +7,15 @@ from pathlib import Path
 import pytest
 from tautscope.bench.drive import SERIAL_NUMBERS
 from tautscope.bench.rig import Bench
+from tautscope.calibration.camera.board import Board
 from tautscope.cli import main
 from tautscope.config import Config, load_config
 from tautscope.config.load import dump_config
 from tautscope.hardware.cameras import Camera
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.twin.drawn_rig import draw_rig
-from test_bench import bench_config
+from test_bench import bench_config, next_capture
+from waiting import until
 
 SEED = 2
 STILL = {"twin.sensor.stamp_error": 0.0}
@@ -29,12 +31,25 @@ def rig(tmp_path: Path) -> tuple[Config, Path]:
     return config, file
 
 
-def test_the_camera_is_calibrated_with_a_board(rig: tuple[Config, Path]) -> None:
+def is_shown(camera: Camera) -> bool:
+    image = next_capture(camera).frame.image
+    return Board().find(image[..., 1].copy()) is not None
+
+
+def test_the_camera_is_calibrated_with_a_board_that_leaves_again(
+    rig: tuple[Config, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tautscope.bench.board.POSE_PERIOD", 0.4)
     config, file = rig
     actual = draw_rig(config, SEED).replace(**STILL)
     with Bench(actual) as bench:
+        with Camera(config.camera) as camera:
+            assert not is_shown(camera)
         bench.request("board camera")
         assert main(["calibrate", "camera", "--config", str(file), "--write"]) == 0
+        bench.request("clear camera")
+        with Camera(config.camera) as camera:
+            until(lambda: not is_shown(camera))
     found = load_config(file)
     record = found.calibration.camera
     assert record is not None
@@ -44,8 +59,9 @@ def test_the_camera_is_calibrated_with_a_board(rig: tuple[Config, Path]) -> None
 
 
 def test_the_colour_is_calibrated_by_moving_the_drives(
-    rig: tuple[Config, Path], capsys: pytest.CaptureFixture[str]
+    rig: tuple[Config, Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("tautscope.calibration.bands.motion.MOST_IMAGES", 30)
     config, file = rig
     with Bench(draw_rig(config, SEED).replace(**STILL)):
         assert main(["calibrate", "colour", "--config", str(file), "--yes", "--write"]) == 0
@@ -73,23 +89,3 @@ def test_an_unplugged_drive_stops_the_calibration(
         assert main(["calibrate", "colour", "--config", str(file), "--yes", "--write"]) == 3
     assert "bending" in capsys.readouterr().err
     assert file.read_text() == before
-
-
-def test_the_board_leaves_the_camera_again(rig: tuple[Config, Path]) -> None:
-    from tautscope.calibration.camera.board import Board
-
-    config, _ = rig
-
-    def is_shown(camera: Camera) -> bool:
-        while (capture := camera.newest()) is None:
-            pass
-        return Board().find(capture.frame.image[..., 1].copy()) is not None
-
-    with Bench(config) as bench, Camera(config.camera) as camera:
-        assert not is_shown(camera)
-        bench.request("board camera")
-        while not is_shown(camera):
-            pass
-        bench.request("clear camera")
-        while is_shown(camera):
-            pass

@@ -13,7 +13,7 @@ from tautscope.hardware.serial_line.frames import Request, State
 
 CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 FLASH, RAM = 32_256, 2_048  # byte, of an Uno with its bootloader
-CYCLE = 0.01  # s
+CYCLE = 0.004  # s
 WATCHDOG = 0.1  # s
 
 
@@ -101,16 +101,16 @@ def test_a_thousand_setpoints_in_order(
     """Of the host's own code, which times them by the Uno's clock; every step is on its pin."""
     for module in (line, serial_drives):
         monkeypatch.setattr(module, "time", uno)
-    config = serial_config(tmp_path, cycle=CYCLE, reply_timeout=0.006, heartbeat_timeout=0.08)
+    config = serial_config(tmp_path, cycle=CYCLE, reply_timeout=0.0035, heartbeat_timeout=0.08)
     drives = serial_drives.SerialDrives(config, uno)
     drives.enable(reset_faults=False)
     steps, previous = uno.c.board_steps(), [0, 0, 0]
     moved = 0
     for number in range(1, 1001):
         began = uno.monotonic()
-        # Counts of insertion, rotation, bending: forwards and back, up to 40 and 30 in a cycle.
+        # Counts of insertion, rotation, bending: forwards and back, up to 16 and 12 in a cycle.
         phase = number if number <= 500 else 1000 - number
-        targets = [40 * phase, -phase, 30 * abs(phase % 40 - 20) - 600]
+        targets = [16 * phase, -phase, 12 * abs(phase % 40 - 20) - 240]
         feedback = drives.exchange(targets)
         assert [one.age for one in feedback] == [0, 0, 0]
         if number > 1:  # where the set-points before sent the motors

@@ -54,7 +54,8 @@ class LabelledImage:
 
     def pixels(self, label: int) -> Image:
         """The pixels (n, 3) with a label."""
-        return np.asarray(self.image[self.labels == label], np.uint8)
+        has_label = (self.labels == label).ravel()
+        return np.asarray(self.image.reshape(-1, 3).compress(has_label, axis=0), np.uint8)
 
 
 def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
