@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.config import DrivesConfig
@@ -35,3 +36,14 @@ def bench(station: Callable[[], LocalBus]) -> Iterator[Callable[..., SimulatedDr
             return stack.enter_context(SimulatedDrives(station(), config, *arguments, **options))
 
         yield make
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed, but their files are empty."""
+
+    def savefig(_: Figure, file: object, **_options: object) -> None:
+        if isinstance(file, Path):
+            file.touch()
+
+    monkeypatch.setattr(Figure, "savefig", savefig)

@@ -27,7 +27,7 @@ from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.motor_rig import require_drives
 from tautscope.hardware.rig import HardwareRig
 from tautscope.runs.recording import per_dof
-from test_bench import RUN
+from test_bench import RUN, with_small_images
 from test_processes import Lines, process
 from waiting import TIMEOUT, until
 
@@ -36,6 +36,7 @@ ENABLED = {"serial": "enabled"}
 """Event of an enabled motor where it is not "torque on"."""
 FAULT = {"serial": ("fault: driver", "rotation, axis 2: it reports a fault: driver")}
 CYCLE = TIMES["cycle"]
+PERIOD = 0.7
 
 
 def bench_config(protocol: str, folder: Path) -> Config:
@@ -44,7 +45,7 @@ def bench_config(protocol: str, folder: Path) -> Config:
 
 
 def slow_config(name: str, folder: Path) -> Config:
-    """A shipped configuration with slow cycles and long timeouts, for a busy computer."""
+    """A shipped configuration for a busy computer: slow cycles, long timeouts, small images."""
     document = to_document(load_config(name))
     document["control"]["period"] = CYCLE
     document["drives"] |= {
@@ -64,13 +65,13 @@ def slow_config(name: str, folder: Path) -> Config:
     )
     document["experiment"] = {
         "periods": 3,
-        "insertion": {"centre": 0.025, "amplitude": 0.001, "period": 1.0},
-        "rotation": {"centre": 0.0, "amplitude": 0.08, "period": 1.0},
-        "bending": {"centre": 0.9, "amplitude": 0.05, "period": 1.0},
+        "insertion": {"centre": 0.025, "amplitude": 0.001, "period": PERIOD},
+        "rotation": {"centre": 0.0, "amplitude": 0.08, "period": PERIOD},
+        "bending": {"centre": 0.9, "amplitude": 0.05, "period": PERIOD},
     }
     document["twin"] |= {"frame_rate": 12.5}
     document["recording"] |= {"image_format": "jpeg"}
-    return from_document(document)
+    return with_small_images(from_document(document))
 
 
 @contextmanager
@@ -90,7 +91,7 @@ def test_a_protocol_runs_on_servos(protocol: str, tmp_path: Path) -> None:
         found = run_on_hardware(config, tmp_path / "run", lambda share: None)
         lines.until(ENABLED.get(protocol, "torque on"), 3)
     trace = found.compensated.recording.trace
-    assert len(trace) == round(3 * 3 * 1.0 / CYCLE)
+    assert len(trace) == round(3 * 3 * PERIOD / CYCLE)
     # The motors did what the commands were, in distance if not in time.
     moved, commanded = (np.ptp(per_dof(trace, name), axis=0) for name in ("applied", "command"))
     resolution = [1 / require_drives(config)[dof].counts_per_unit for dof in Dof]
