@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.config import DrivesConfig
@@ -42,8 +41,8 @@ def bench(station: Callable[[], LocalBus]) -> Iterator[Callable[..., SimulatedDr
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are composed, but their files are empty."""
 
-    def savefig(_: Figure, file: object, **_options: object) -> None:
+    def savefig(_: object, file: object, **_options: object) -> None:
         if isinstance(file, Path):
             file.touch()
 
-    monkeypatch.setattr(Figure, "savefig", savefig)
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", savefig)
