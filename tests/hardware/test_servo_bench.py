@@ -36,7 +36,6 @@ ENABLED = {"serial": "enabled"}
 """Event of an enabled motor where it is not "torque on"."""
 FAULT = {"serial": ("fault: driver", "rotation, axis 2: it reports a fault: driver")}
 CYCLE = TIMES["cycle"]
-PERIOD = 0.7
 
 
 def bench_config(protocol: str, folder: Path) -> Config:
@@ -65,9 +64,9 @@ def slow_config(name: str, folder: Path) -> Config:
     )
     document["experiment"] = {
         "periods": 3,
-        "insertion": {"centre": 0.025, "amplitude": 0.001, "period": PERIOD},
-        "rotation": {"centre": 0.0, "amplitude": 0.08, "period": PERIOD},
-        "bending": {"centre": 0.9, "amplitude": 0.05, "period": PERIOD},
+        "insertion": {"centre": 0.025, "amplitude": 0.001, "period": 1.0},
+        "rotation": {"centre": 0.0, "amplitude": 0.08, "period": 1.0},
+        "bending": {"centre": 0.9, "amplitude": 0.05, "period": 1.0},
     }
     document["twin"] |= {"frame_rate": 12.5}
     document["recording"] |= {"image_format": "jpeg"}
@@ -91,7 +90,7 @@ def test_a_protocol_runs_on_servos(protocol: str, tmp_path: Path) -> None:
         found = run_on_hardware(config, tmp_path / "run", lambda share: None)
         lines.until(ENABLED.get(protocol, "torque on"), 3)
     trace = found.compensated.recording.trace
-    assert len(trace) == round(3 * 3 * PERIOD / CYCLE)
+    assert len(trace) == round(3 * 3 * 1.0 / CYCLE)
     # The motors did what the commands were, in distance if not in time.
     moved, commanded = (np.ptp(per_dof(trace, name), axis=0) for name in ("applied", "command"))
     resolution = [1 / require_drives(config)[dof].counts_per_unit for dof in Dof]
