@@ -86,6 +86,7 @@ def test_the_servos_are_fast_enough_for_the_experiment(config: Config) -> None:
         assert fastest < min(axis.speed_limit, turns * COUNTS_PER_TURN / axis.counts_per_unit), dof
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_protocol_ends_in_a_folder_to_share(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

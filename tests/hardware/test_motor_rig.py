@@ -190,6 +190,7 @@ class Tracker:
         return SimpleNamespace(position=position, quaternion=rotation, time=time.monotonic())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_robot_of_the_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

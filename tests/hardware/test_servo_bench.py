@@ -27,7 +27,7 @@ from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.motor_rig import require_drives
 from tautscope.hardware.rig import HardwareRig
 from tautscope.runs.recording import per_dof
-from test_bench import RUN
+from test_bench import RUN, with_small_images
 from test_processes import Lines, process
 from waiting import TIMEOUT, until
 
@@ -44,7 +44,7 @@ def bench_config(protocol: str, folder: Path) -> Config:
 
 
 def slow_config(name: str, folder: Path) -> Config:
-    """A shipped configuration with slow cycles and long timeouts, for a busy computer."""
+    """A shipped configuration for a busy computer: slow cycles, long timeouts, small images."""
     document = to_document(load_config(name))
     document["control"]["period"] = CYCLE
     document["drives"] |= {
@@ -70,7 +70,7 @@ def slow_config(name: str, folder: Path) -> Config:
     }
     document["twin"] |= {"frame_rate": 12.5}
     document["recording"] |= {"image_format": "jpeg"}
-    return from_document(document)
+    return with_small_images(from_document(document))
 
 
 @contextmanager

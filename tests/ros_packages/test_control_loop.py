@@ -185,7 +185,9 @@ def test_what_is_not_finite_or_not_known_changes_nothing():
 
 @pytest.mark.parametrize("profile", ["paper", "best"])
 def test_the_commands_are_those_of_the_loop_alone(profile, monkeypatch):
-    monkeypatch.setattr(record, "DURATION", 56.0)
+    shorter = {"DURATION": 56.0, "PERIOD": 5e-3, "TICKS_PER_IMAGE": 8, "LATENCY": 16}
+    for name, value in shorter.items():
+        monkeypatch.setattr(record, name, value)
     recorded = record.record_features(profile)
     control = ControlLoop(recorded.config, Refused())
     control.request("enable")
