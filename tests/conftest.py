@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from common.paths import DATA
 from drawn import DrawnRig, short_experiment
+from matplotlib.figure import Figure
 from tautscope.loop.references import SineSequence
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
@@ -66,6 +67,17 @@ def _mucosa_drawn_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(camera, "draw_mucosa", draw)
         yield
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed, but their files are empty."""
+
+    def savefig(_: Figure, file: object, **_options: object) -> None:
+        if isinstance(file, Path):
+            file.touch()
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture(scope="session")

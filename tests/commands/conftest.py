@@ -1,22 +1,8 @@
-"""Shared fixtures: less to draw and to fit."""
-
-from pathlib import Path
+"""Shared fixtures."""
 
 import pytest
-from matplotlib.figure import Figure
 from tautscope.analysis.comparison import analyze
 from tautscope.analysis.models.registry import MODELS
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are composed, but their files are empty."""
-
-    def savefig(_: Figure, file: object, **_options: object) -> None:
-        if isinstance(file, Path):
-            file.touch()
-
-    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture

@@ -35,14 +35,3 @@ def bench(station: Callable[[], LocalBus]) -> Iterator[Callable[..., SimulatedDr
             return stack.enter_context(SimulatedDrives(station(), config, *arguments, **options))
 
         yield make
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are composed, but their files are empty."""
-
-    def savefig(_: object, file: object, **_options: object) -> None:
-        if isinstance(file, Path):
-            file.touch()
-
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", savefig)
