@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from serial_settings import ARDUINO, compiled, require_tool, run, serial_config
+from tautscope.hardware import drive_group
 from tautscope.hardware.serial_line import frames, line, serial_drives
 from tautscope.hardware.serial_line.frames import Request, State
 
@@ -99,7 +100,7 @@ def test_a_thousand_setpoints_in_order(
     uno: SimulatedUno, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of the host's own code, which times them by the Uno's clock; every step is on its pin."""
-    for module in (line, serial_drives):
+    for module in (line, serial_drives, drive_group):
         monkeypatch.setattr(module, "time", uno)
     config = serial_config(tmp_path, cycle=CYCLE, reply_timeout=0.0035, heartbeat_timeout=0.08)
     drives = serial_drives.SerialDrives(config, uno)
