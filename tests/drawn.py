@@ -20,12 +20,30 @@ __all__ = [
     "make_drawn_rig",
     "make_stalling_rig",
     "short_experiment",
+    "with_half_images",
+    "with_periods",
 ]
 
 
 def short_experiment() -> Config:
     """That of the example in profile `paper`, whose reduction is that of the gain."""
     return own_rig.short_experiment().replace(profile="paper")
+
+
+def with_half_images(config: Config) -> Config:
+    """The same view in images of half the width and height."""
+    camera = config.camera
+    values = ("width", "height", "fx", "fy", "cx", "cy")
+    halves = {f"camera.{key}": getattr(camera, key) / 2 for key in values[2:]}
+    return config.replace(
+        **{"camera.width": camera.width // 2, "camera.height": camera.height // 2}, **halves
+    )
+
+
+def with_periods(config: Config, seconds: float) -> Config:
+    """The same with sines of another period."""
+    names = ("insertion", "rotation", "bending")
+    return config.replace(**{f"experiment.{name}.period": seconds for name in names})
 
 
 class BadFrameRig(DrawnRig):

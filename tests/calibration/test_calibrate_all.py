@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+from tautscope.calibration.geometry import sweep
 from tautscope.calibration.result import CalibrationResult
 from tautscope.cli import main
 from tautscope.commands import calibration_steps, question
@@ -20,6 +21,14 @@ from tautscope.twin.drawn_rig import draw_rig
 
 Capture = pytest.CaptureFixture[str]
 COMMAND = ("calibrate", "all", "--config", "rig.toml")
+SHORT = """
+[twin]
+frame_rate = 8.0
+[experiment]
+insertion.period = 7.0
+rotation.period = 7.0
+bending.period = 7.0
+"""
 
 
 class Steps:
@@ -147,7 +156,8 @@ def test_the_twin_is_calibrated_from_camera_to_motion(
     capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("rig.toml").write_text(config_file("article_rig").read_text())
+    monkeypatch.setitem(sweep.__kwdefaults__, "duration", 25.0)
+    Path("rig.toml").write_text(config_file("article_rig").read_text() + SHORT)
     told = load_config("rig.toml")
     assert main([*COMMAND, "--twin", "--seed", "7", "--out", "out"]) == 0
     config, actual = load_config("rig.toml"), draw_rig(told, 7)

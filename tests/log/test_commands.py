@@ -8,7 +8,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from drawn import BACKLASH
+from drawn import BACKLASH, with_half_images, with_periods
 from recorded import record
 from rosbags.highlevel import AnyReader
 from tautscope.cli import main
@@ -46,7 +46,8 @@ def write_video(file: Path, log: Log, start: float) -> None:
     }
     with av.open(str(file), "w") as container:
         stream = container.add_stream("ffv1", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 720, 576, "bgr0"
+        camera = log.config.camera
+        stream.width, stream.height, stream.pix_fmt = camera.width, camera.height, "bgr0"
         stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
         for index, at in updates.items():
             frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
@@ -173,7 +174,7 @@ def test_replay_of_a_video_and_motor_positions(
 def whole(tmp_path_factory: pytest.TempPathFactory, config: Config) -> tuple[Path, Recording]:
     """The whole protocol, in which each motor turns six times."""
     path = tmp_path_factory.mktemp("whole") / "run.mcap"
-    recording, _ = record(path, config, 36.0)
+    recording, _ = record(path, with_half_images(with_periods(config, 3.0)))
     return path, recording
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import DrawnRig
+from drawn import DrawnRig, with_periods
 from tautscope.cli import main
 from tautscope.config import Config
 from tautscope.errors import MissingPathError, RecordError
@@ -24,6 +24,7 @@ Capture = pytest.CaptureFixture[str]
 def pair(tmp_path_factory: pytest.TempPathFactory, config: Config) -> tuple[Path, RecordedRun]:
     """A run folder with both logs, and its recordings."""
     folder = tmp_path_factory.mktemp("pair")
+    config = with_periods(config, 2.5)
     reference = SineSequence(config.experiment)
     found = []
     for name, compensate in (("uncompensated", False), ("compensated", True)):
@@ -171,8 +172,10 @@ def test_both_runs_have_the_same_reference(
     pair: tuple[Path, RecordedRun], config: Config, tmp_path: Path
 ) -> None:
     folder, _ = pair
-    other = config.replace(**{"experiment.periods": config.experiment.periods + 1})
+    periods = config.experiment.periods + 1
+    other = with_periods(config, 2.5).replace(**{"experiment.periods": periods})
     reference = SineSequence(other.experiment)
+    reference.duration = 2.5 * periods
     with LogWriter(
         tmp_path / "other.mcap",
         other,
