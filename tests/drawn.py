@@ -33,11 +33,9 @@ def short_experiment() -> Config:
 def with_half_images(config: Config) -> Config:
     """The same view in images of half the width and height."""
     camera = config.camera
-    values = ("width", "height", "fx", "fy", "cx", "cy")
-    halves = {f"camera.{key}": getattr(camera, key) / 2 for key in values[2:]}
-    return config.replace(
-        **{"camera.width": camera.width // 2, "camera.height": camera.height // 2}, **halves
-    )
+    sides = {f"camera.{key}": getattr(camera, key) // 2 for key in ("width", "height")}
+    lens = {f"camera.{key}": getattr(camera, key) / 2 for key in ("fx", "fy", "cx", "cy")}
+    return config.replace(**sides, **lens)
 
 
 def with_periods(config: Config, seconds: float) -> Config:

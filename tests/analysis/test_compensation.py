@@ -1,7 +1,6 @@
 """What the verdict says that the loop would do, and its figure."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +10,10 @@ from records.simulated import simulate
 from tautscope.analysis.compensation import as_played, plant, run
 from tautscope.analysis.compensator import compensator
 from tautscope.analysis.slide import slide
-from tautscope.analysis.verdict import Verdict, judge
+from tautscope.analysis.verdict import judge
 from tautscope.errors import RecordError
 from tautscope.runs.records import Cleaning, Record, read_record
-
-
-@cache
-def judged(kind: str, seed: int) -> Verdict:
-    return judge(simulate(kind, seed).record)
+from test_findings import judged
 
 
 def test_the_loop_does_on_the_other_half_what_the_verdict_says(tool_folder: Path) -> None:

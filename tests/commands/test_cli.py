@@ -9,7 +9,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-from drawn import make_bad_frame_rig, make_drawn_rig, make_stalling_rig, short_experiment
+from drawn import (
+    make_bad_frame_rig,
+    make_drawn_rig,
+    make_stalling_rig,
+    short_experiment,
+    with_periods,
+)
 from refused import failed
 from tautscope import figure_style
 from tautscope.cli import main
@@ -61,8 +67,7 @@ def on_drawn_rig(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def config_file(tmp_path: Path) -> str:
     file = tmp_path / "short.toml"
-    periods = {f"experiment.{dof}.period": 2.5 for dof in ("insertion", "rotation", "bending")}
-    file.write_text(dump_config(short_experiment().replace(**periods)), encoding="utf-8")
+    file.write_text(dump_config(with_periods(short_experiment(), 2.5)), encoding="utf-8")
     return str(file)
 
 

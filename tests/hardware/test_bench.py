@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn import with_half_images
 from drive_settings import drives_document
 from tautscope.bench.ground_truth import GroundTruthWriter, read_ground_truth
 from tautscope.bench.rig import Bench
@@ -61,13 +62,6 @@ def bench_config(folder: Path, **changes: Any) -> Config:
         "recording": {"image_format": "jpeg"},
     }
     return from_document(document).replace(**changes)
-
-
-def with_small_images(config: Config) -> Config:
-    """Half the width and height, which are drawn in a fraction of the time."""
-    sides = ("width", "height", "fx", "fy", "cx", "cy")
-    halves = {f"camera.{key}": type(x := getattr(config.camera, key))(x / 2) for key in sides}
-    return config.replace(**halves)
 
 
 def next_capture(camera: Camera) -> Capture:
@@ -173,7 +167,7 @@ def _copy(reader: int, file: Path) -> None:
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[tuple[Config, Path, Lines]]:
     """A bench in its own process: configuration, its file, its output."""
-    config = with_small_images(bench_config(tmp_path))
+    config = with_half_images(bench_config(tmp_path))
     file = tmp_path / "rig.toml"
     file.write_text(dump_config(config), encoding="utf-8")
     arguments = ("-c", RUN, "bench", "--config", str(file), "--truth", str(tmp_path / "truth.csv"))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn import with_half_images
 from servo_settings import MODELS, TIMES
 from tautscope.bench.rig import Bench
 from tautscope.bench.servos import SimulatedServos
@@ -27,7 +28,7 @@ from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.motor_rig import require_drives
 from tautscope.hardware.rig import HardwareRig
 from tautscope.runs.recording import per_dof
-from test_bench import RUN, with_small_images
+from test_bench import RUN
 from test_processes import Lines, process
 from waiting import TIMEOUT, until
 
@@ -70,7 +71,7 @@ def slow_config(name: str, folder: Path) -> Config:
     }
     document["twin"] |= {"frame_rate": 12.5}
     document["recording"] |= {"image_format": "jpeg"}
-    return with_small_images(from_document(document))
+    return with_half_images(from_document(document))
 
 
 @contextmanager

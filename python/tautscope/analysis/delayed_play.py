@@ -67,7 +67,7 @@ class Signals:
         x = np.clip(x, fitted[0], fitted[-1])  # a polynomial says nothing outside
         degree = 3 if len(at) >= 12 else 1
         self.drifts = np.polynomial.legendre.legvander(x, degree)
-        # A search varies one parameter at a time, the grid nine delays.
+        # As many as successive shapes share: a search varies one parameter at a time.
         self._late = lru_cache(9)(lambda delay: self._delayed(self.time - delay))
         self._play = lru_cache(len(_PLAYS))(lambda r: operator(self.all_commands, r, 0.0))
 

@@ -236,12 +236,12 @@ def _extended(
 
 
 def _grid(signals: Signals) -> list[Shape]:
-    """Shapes of which the best are refined."""
+    """Shapes of which the best are refined; successive ones share plays, and all nine delays."""
     return [
         Shape(share * signals.extent, rounding, delay)
-        for delay in (signals.longest_delay * np.linspace(-1, 1, 9)).tolist()
         for share in _RADII.tolist()
         for rounding in ((0.0, 1.0) if share else (0.0,))
+        for delay in (signals.longest_delay * np.linspace(-1, 1, 9)).tolist()
     ]
 
 
@@ -252,10 +252,7 @@ def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]
     walk. The same search explains it.
     """
     keep = signals.where
-    outputs = np.empty((len(grid), len(keep)))
-    # In this order shapes share the plays of the one before.
-    for k in sorted(range(len(grid)), key=lambda k: (grid[k].radius, grid[k].rounding)):
-        outputs[k] = signals.output(grid[k])[keep]
+    outputs = np.array([signals.output(shape)[keep] for shape in grid])
     base = np.linalg.qr(signals.drifts[keep])[0]
     rng = np.random.default_rng(0)
     target = signals.target
