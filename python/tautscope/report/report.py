@@ -45,6 +45,10 @@ pre { background: #f6f6f6; padding: .8rem 1rem; font-size: .8rem; line-height: 1
       overflow-x: auto; }
 dl { display: grid; grid-template-columns: max-content auto; gap: .1rem 1.5rem; }
 dt { color: #555; } dd { margin: 0; }
+@media (max-width: 45rem) { body { padding: 0 1rem; } .first { padding-left: .5rem; }
+  td:first-child { white-space: normal; }
+  .meanings :is(th, td):nth-child(n) { min-width: 0; white-space: normal; font-size: .8rem; }
+  .figures td:first-child { position: sticky; left: 0; min-width: 7rem; background: #fff; } }
 @media print { body { margin: 0; max-width: none; font-size: 10pt; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } pre { white-space: pre-wrap; } }
 """
