@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tautscope.config import DISTURBANCES
+from tautscope.config import DISTURBANCES, LawConfig
 from tautscope.dof import Dof
 
 OPERATORS = ("operator", "disturbed operator")
@@ -49,7 +49,7 @@ GOALS = {
     "disturbed operator: tip overspeed": Goal("ratio"),
     "reduction of mean width": Goal("share", 0.95, "min"),
     "reduction of max width": Goal("share", 0.90, "min"),
-    "actuator gain": Goal("ratio", 5.0),
+    "actuator gain": Goal("ratio", LawConfig().free_gain),
     "tip overspeed": Goal("ratio", 2.0),
     "tip overspeed over paper's": Goal("ratio", 1.0, paired="tip overspeed"),
     "start": Goal("periods", 1.0),

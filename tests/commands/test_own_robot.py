@@ -82,7 +82,7 @@ def test_a_rig_of_thirty_lines_is_compensated(
     np.testing.assert_allclose(
         recording.tracking_rms(10.0),
         [dof["compensated_rms"] for dof in found["dof"].values()],
-        rtol=0.05,  # of all ticks, the other of the measurements
+        rtol=0.1,  # of all ticks, the other of the measurements, few in the short crossings
     )
     assert load_config("out/config.toml") == load_config("robot.toml")
     assert (folder / "out" / "tracking.png").stat().st_size > 10_000

@@ -46,7 +46,7 @@ def operator(seed: int) -> Floats:
 def test_commands_are_bounded_per_axis_and_by_the_norm(seed: int) -> None:
     references = operator(seed)
     moved, travel = (np.diff(each, axis=0) / UNIT for each in (run(references, seed), references))
-    gain = CONFIG.insertion.free_gain
+    gain = CONFIG.law.free_gain
     for group in GROUPS:
         most = gain * np.linalg.norm(travel[:, group], axis=1)
         assert np.all(np.linalg.norm(moved[:, group], axis=1) <= most * (1 + 1e-9) + 1e-12)
@@ -83,6 +83,6 @@ def test_one_dof_alone_has_the_limited_gain_of_the_article(seed: int) -> None:
         else:
             assert np.all(moved[:, Dof.BENDING] == 0)
         product = moved[:, dof] * travel[:, dof]
-        most = CONFIG[dof].free_gain * travel[:, dof] ** 2
+        most = CONFIG.law.free_gain * travel[:, dof] ** 2
         rounding = 1e-15 * np.abs(travel[:, dof])
         assert np.all((product >= -rounding) & (product <= most * (1 + 1e-9) + rounding)), dof

@@ -12,8 +12,8 @@ from drawn import EXAMPLES
 
 def of_your_own_rig(reductions: list[float]) -> None:
     assert len(reductions) == 3
-    # 1 % more than all is what images leave uncertain of the width.
-    assert all(90 <= reduction <= 101 for reduction in reductions)
+    # 4 % more than all is what images leave uncertain of the width.
+    assert all(90 <= reduction <= 104 for reduction in reductions)
 
 
 def of_a_robot(errors: list[float]) -> None:

@@ -11,6 +11,7 @@ from tautscope.loop.references import OperatorMotion
 from tautscope.report.tracking_bound import play_bound, track_ideal_plays, tracking_bound
 
 CONFIG = Config()
+GAIN = CONFIG.law.free_gain
 HALF = np.array([5e-3, 0.9, 0.55])  # of the article's Table 1
 RADIUS = CONFIG.instrument.diameter / 2
 MEMORY = 1e-4
@@ -41,14 +42,14 @@ def test_reduction_of_a_triangle_is_that_of_the_closed_form(dof: Dof) -> None:
 
     Without compensation, after a reversal, the error u - q changes from -h to h over a travel of 2
     h and stays. With it, the direction changes after a travel d; the command then crosses the
-    rest of the gap, 2 h - d, at 5 times the speed of the reference, so the error grows to
-    p = d + (2 h - d) / 5; it is then compensated at twice the speed, over a travel of p.
+    rest of the gap, 2 h - d, at K_b times the speed of the reference, so the error grows to
+    p = d + (2 h - d) / K_b; it is then compensated at twice the speed, over a travel of p.
     """
     h, surface = HALF[dof], (1.0, RADIUS, 1.0)[dof]
     length, delay = 4 * h, np.log(2) * MEMORY / surface
     phase = np.arange(0, 4, 1e-4) % 1
     signal = length * (np.abs(2 * phase - 1) - 0.5)
-    peak = delay + (2 * h - delay) / 5
+    peak = delay + (2 * h - delay) / GAIN
     expected = 1 - np.sqrt(2 / 3 * peak**3 / (h**2 * (length - 4 / 3 * h)))
     found = tracking_bound(alone(dof, signal), CONFIG, first=20_000)
     assert found[dof] == pytest.approx(expected, abs=2e-3)
@@ -60,7 +61,7 @@ def test_reduction_of_a_play_by_itself_is_that_of_the_closed_form() -> None:
     h = 50.0
     phase = np.arange(0, 4, 1e-4) % 1
     signal = 4 * h * (np.abs(2 * phase - 1) - 0.5)
-    expected = 1 - np.sqrt(2 / 3 * (2 * h / 5) ** 3 / (h**2 * (4 * h - 4 / 3 * h)))
+    expected = 1 - np.sqrt(2 / 3 * (2 * h / GAIN) ** 3 / (h**2 * (4 * h - 4 / 3 * h)))
     assert play_bound(signal, h, first=20_000) == pytest.approx(expected, abs=2e-3)
 
 
@@ -99,9 +100,9 @@ def test_command_and_tip_are_limited_by_the_reference(seed: int) -> None:
         moved, commanded, followed = (
             norm(np.diff(each, axis=0), group) for each in (reference, command, tip)
         )
-        assert (commanded <= 5 * moved + 1e-12).all()
+        assert (commanded <= GAIN * moved + 1e-12).all()
         assert (followed <= 2 * moved * (1 + 1e-3) + 1e-12).all()
-        assert (commanded > 4.99 * moved)[moved > 0].any()
+        assert (commanded > 0.998 * GAIN * moved)[moved > 0].any()
         assert (followed > 1.99 * moved)[moved > 0].any()
         rests = moved == 0
         assert rests.sum() > 10

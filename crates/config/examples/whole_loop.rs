@@ -27,9 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let text = path.map_or_else(|| Ok(String::new()), std::fs::read_to_string)?;
     let settings: Settings = Configuration::parse(&text)?.read()?;
     let mut bare = settings;
-    for dof in [&mut bare.insertion, &mut bare.rotation, &mut bare.bending] {
-        dof.free_gain = 1.0;
-    }
+    bare.law.free_gain = 1.0;
     let [without, with] = [tracking_error(&bare)?, tracking_error(&settings)?];
     let units = [
         ("insertion", "mm", 1e3),

@@ -15,8 +15,8 @@ const UPDATES: f64 = 50.0;
 const COUNTS: f64 = 250.0;
 /// `speed` without a value, in `width_limit` per s.
 pub const SPEED: f64 = 2.0;
-/// Speed of the command over that of the reference while the slack is crossed at `gain_limit`.
-const COMMAND_SPEED: f64 = 2.0;
+/// `command_speed` without a value, over `gain_limit` times `speed`.
+pub const COMMAND_SPEED: f64 = 2.0;
 /// Widest `range`, in `width_limit`, and without a value that about 0.
 pub const MOST_RANGE: f64 = 100.0;
 
@@ -33,6 +33,7 @@ pub struct AxisSettings {
     pub lever: f64,
     pub expected_width: Option<f64>,
     pub gain_limit: f64,
+    pub command_speed: Option<f64>,
     pub delta_minus: f64,
     pub delta_plus: f64,
 }
@@ -130,7 +131,14 @@ impl AxesSettings {
             friction: core::Friction::new(group, dofs.map(|dof| dof.lever))?,
             control: self.control,
             safety: self.safety_of(dofs),
-            law: self.law,
+            law: if compensate {
+                self.law
+            } else {
+                core::LawSettings {
+                    free_gain: 1.0,
+                    ..self.law
+                }
+            },
             estimation: self.estimation,
         })
     }
@@ -145,7 +153,7 @@ impl AxesSettings {
             width_limit: dofs.map(|dof| dof.width_limit),
             offset_limit: dofs.map(|dof| OFFSET_LIMIT * dof.width_limit),
             reference_speed: dofs.map(AxisSettings::speed),
-            command_speed: dofs.map(|dof| COMMAND_SPEED * dof.gain_limit * dof.speed()),
+            command_speed: dofs.map(AxisSettings::command_speed),
             command_travel: dofs.map(|dof| {
                 let far = MOST_RANGE / 2.0 * dof.width_limit;
                 dof.range.unwrap_or((-far, far))
@@ -164,7 +172,12 @@ impl AxisSettings {
     /// What the blocks of the core do not check.
     fn check(&self) -> Result<(), core::ConfigError> {
         let width = self.width_limit;
-        for (name, value) in [("width_limit", width), ("speed", self.speed())] {
+        let positive = [
+            ("width_limit", width),
+            ("speed", self.speed()),
+            ("command_speed", self.command_speed()),
+        ];
+        for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(error(name, value, "a finite number above 0"));
             }
@@ -182,6 +195,11 @@ impl AxisSettings {
 
     fn speed(&self) -> f64 {
         self.speed.unwrap_or(SPEED * self.width_limit)
+    }
+
+    fn command_speed(&self) -> f64 {
+        let usual = COMMAND_SPEED * self.gain_limit * self.speed();
+        self.command_speed.unwrap_or(usual)
     }
 
     fn settings(&self, article: &core::DofSettings, compensate: bool) -> core::DofSettings {

@@ -52,7 +52,14 @@ impl From<toml::de::Error> for Error {
 /// The defaults, with a degree of freedom of `[[dof]]`; written by `tests/config/test_rust_defaults.py`.
 const DEFAULTS: &str = include_str!("defaults.toml");
 /// Keys of `[[dof]]` without a default.
-const OPTIONAL: [&str; 5] = ["name", "width_limit", "range", "speed", "expected_width"];
+const OPTIONAL: [&str; 6] = [
+    "name",
+    "width_limit",
+    "range",
+    "speed",
+    "expected_width",
+    "command_speed",
+];
 /// Sections of which a loop of the article's instrument and its marker detection read every key.
 const OF_ARTICLE: [&str; 11] = [
     "control",

@@ -155,7 +155,7 @@ def record(
 
     Gains of 1 are no compensation.
     """
-    changes: dict[str, object] = {"experiment.periods": PERIODS}
+    changes: dict[str, object] = {"experiment.periods": PERIODS, "law.free_gain": 1.0}
     for dof in Dof:
         sine = config.experiment[dof]
         changes[f"{dof.label}.free_gain"] = 1.0

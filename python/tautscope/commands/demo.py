@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +13,9 @@ from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
-from tautscope.report.operator_motion import OPERATOR_ROWS
-from tautscope.report.results import ROWS
-from tautscope.report.rows import Row
 from tautscope.runs.output_folder import recording_saved
 
 if TYPE_CHECKING:
-    from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
 
 SPEED = 12.0
@@ -139,30 +134,10 @@ def _load(options: argparse.Namespace) -> Config:
 def _print_summary(demo: Demo, folder: Path) -> None:
     dofs = ", ".join(dof.label for dof in demo.results[0])
     several = f", medians of {len(demo.seeds)} seeds" if len(demo.seeds) > 1 else ""
-    left = [
-        f"{_figures(results, ROWS, 'compensated')} with profile {name}"
-        for name, results in demo.by_profile.items()
-    ]
-    reduction = _figures(demo.operator_results, OPERATOR_ROWS, "reduction")
     lines = [
         f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s ({dofs}{several}).",
-        f"Slow sines: of {_figures(demo.results, ROWS, 'uncompensated')} of slack there remain "
-        f"{', '.join(left)}.",
-        f"An operator's motion of all at once: tracking error less by {reduction}.",
+        *demo.verdict,
         f"Without and with compensation: {folder / 'film.gif'}",
         f"Tables, figures, {len(demo.warnings)} warnings of the loop: {folder / 'report.html'}",
     ]
     print("\n".join(lines))
-
-
-def _figures(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: str) -> str:
-    """The median of a figure of each DOF."""
-    from tautscope.report import tables  # noqa: PLC0415
-    from tautscope.report.results import combine  # noqa: PLC0415
-
-    row = next(row for row in rows if row.name == name)
-    texts = []
-    for dof, found in combine(results, "median").items():
-        unit = f" {dof.display_unit}" if row.kind == "length" else ""
-        texts.append(f"{tables.cell(row, dof, getattr(found, name))}{unit}")
-    return " / ".join(texts)

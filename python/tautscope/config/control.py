@@ -43,9 +43,9 @@ class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Standard deviation of the tip about the reference before the first image [m or rad]; about
     half the slack [ours]."""
     free_gain: Gain = 5.0
-    """K_b: command over reference while the slack is crossed [paper]."""
+    """K_b of profile ``paper``: command over reference while the slack is crossed [paper]."""
     gain_limit: Gain = 5.0
-    """Bound of every gain, free_gain included [paper]."""
+    """Bound of every gain of profile ``paper``, free_gain included [paper]."""
     recovery: Annotated[float, Meta(ge=0, lt=1)] = 0.0
     """Share of the reference's travel by which the command returns to it after changed offsets
     [paper]."""
@@ -67,9 +67,12 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Vector law of profile ``best``, docs/best.md. All [ours].
 
     Travels are in the unit of each DOF, three quarters of its expected_width, so that one set
-    serves all. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
+    serves all. delta_minus and delta_plus are those of `DofConfig`.
     """
 
+    free_gain: Gain = 20.0
+    """K_b: largest speed of the command over that of the reference. The growth of its speed and
+    `safety.command_speed` bound it, too."""
     tip_gain: Gain = 2.0
     """Largest speed of the predicted tip over that of the reference."""
     direction_travel: Positive = 0.02

@@ -20,7 +20,7 @@ _LAG = 0.06
 _BITRATE = 250_000
 """`DrivesConfig.bitrate` [bit/s], which the 16 MHz of an Arduino divide exactly."""
 _SPEED_SHARE = 0.8
-"""Speed limit of a servo over its speed without load."""
+"""Speed limit of a servo over its speed without load, which falls with its torque limit."""
 _FOLLOWING_COUNTS, _FOLLOWING_SHARE = 64, 0.01
 """`AxisConfig.following_error` of a servo [counts], 5.6 degrees of the horn; of others over the
 width of the travel."""
@@ -85,6 +85,9 @@ def _of_servo(key: str, motor: dict[str, Any], protocol: str) -> dict[str, Any]:
     counts = (radian | motor).get("counts_per_unit")
     if not isinstance(counts, int | float) or counts <= 0:
         return radian  # refused when it is checked
-    turns = _SPEED_SHARE * MODELS[model].speed / 60
+    torque = motor.get("torque_limit", 1.0)
+    if not isinstance(torque, int | float):
+        return radian  # refused when it is checked
+    turns = _SPEED_SHARE * torque * MODELS[model].speed / 60
     speed = turns * COUNTS_PER_TURN / counts
     return radian | {"speed_limit": speed, "following_error": _FOLLOWING_COUNTS / counts}

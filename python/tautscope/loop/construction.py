@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from tautscope import _core
 from tautscope.config import Config
@@ -12,15 +13,46 @@ from tautscope.dof import Dof
 
 
 def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
-    """The table of settings that the core reads; without compensation every gain is 1."""
+    """The table of settings that the core reads; without compensation every gain is 1.
+
+    No command is faster than the motors of ``[drives]``, which would refuse it.
+    """
     document: dict[str, Any] = msgspec.to_builtins(config)
+    usual = document["safety"]["command_speed"] = list(config.safety.command_speed)
+    for index, speed in enumerate(motor_speeds(config)):
+        if not config.dof:
+            usual[index] = min(usual[index], speed)
+        else:
+            entry = config.dof[index]
+            document["dof"][index]["command_speed"] = min(entry.largest_command_speed, speed)
     if config.dof:
         # Not used with [[dof]]: only its defaults that are no lengths.
         document["insertion"] = msgspec.to_builtins(Config().insertion)
-    elif not compensate:
+    if not compensate:
         for dof in Dof:
             document[dof.label]["free_gain"] = 1.0
+        document["law"]["free_gain"] = 1.0
     return document
+
+
+def motor_speeds(config: Config) -> list[float]:
+    """Speeds (n,) of the DOFs [m/s or rad/s] at which no motor of ``[drives]`` is too fast.
+
+    Of motors = M q, |dq_n| <= w_n min_m (v_m / sum_k |M_mk| w_k) over the motors m that n moves,
+    with the speed limits v and the width limits w. Empty without drives, and with
+    ``actuators.map``, whose motors are a function of the user's.
+    """
+    drives, actuators = config.drives, config.actuators
+    if drives is None or (actuators is not None and actuators.map):
+        return []
+    limits = np.array([drives[motor].speed_limit for motor in drives.all_motors])
+    if actuators is None:
+        return [float(limit) for limit in limits]
+    widths = np.array([dof.width_limit for dof in config.dof])
+    moved = np.abs(actuators.matrix) * widths
+    with np.errstate(divide="ignore"):
+        shares = np.where(moved > 0.0, (limits / moved.sum(axis=1))[:, None], np.inf)
+    return [float(speed) for speed in widths * shares.min(axis=0)]
 
 
 def build_instrument(config: Config) -> _core.Instrument:

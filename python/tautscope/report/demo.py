@@ -7,6 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.report import report, tables
 from tautscope.report.operator_motion import (
+    OPERATOR_ROWS,
     OperatorResults,
     evaluate_operator_motion,
     operator_motion,
@@ -104,6 +106,20 @@ class Demo:
         """Warnings of the first seed's compensated runs, those of the operator motion marked."""
         marked = (f"operator motion: {line}" for line in self.operator_compensated.warnings)
         return (*self.compensated.warnings, *marked)
+
+    @property
+    def verdict(self) -> tuple[str, str]:
+        """A sentence on the slack that remains, and one on an operator's motion."""
+        left = [
+            f"{tables.triple(results, ROWS, 'compensated')} with profile {name}"
+            for name, results in self.by_profile.items()
+        ]
+        reduction = tables.triple(self.operator_results, OPERATOR_ROWS, "reduction")
+        return (
+            f"Slow sines: of {tables.triple(self.results, ROWS, 'uncompensated')} of slack there "
+            f"remain {', '.join(left)}.",
+            f"An operator's motion of all at once: tracking error less by {reduction}.",
+        )
 
     def to_json(self) -> dict[str, Any]:
         """The output of ``tautscope demo --json``; an unknown figure is None.
@@ -250,9 +266,12 @@ def demo_report(demo: Demo, figures: Iterable[tuple[Figure, str]], film: bytes) 
         "simulated": f"{demo.sim_seconds:.0f} s in {(3 + len(profiles)) * len(seeds)} runs",
         "took": f"{demo.wall_seconds:.0f} s",
     }
+    verdict = "".join(f'<p class="verdict">{escape(line)}</p>' for line in demo.verdict)
     return report.page(
         f"on a simulated instrument, camera images the only feedback; {count}",
-        f"""{report.embedded(film, "gif", _FILM_CAPTION)}
+        f"""{verdict}
+{report.embedded(film, "gif", _FILM_CAPTION)}
+{report.figure_list(figures)}
 <h2>Table 1</h2>
 <div class="wide">{report.figures_table(profiles, ROWS, "true tip")}</div>
 <p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
@@ -263,8 +282,6 @@ Widths over the last two periods of each degree of freedom: mean over 41 levels 
 {report.row_explanations(ROWS, profiles.get("best", ()))}
 {report.operator_section(demo.config.profile, demo.operator_results)}
 {report.warning_list(demo.warnings)}
-<h2>Figures</h2>
-{report.figure_list(figures)}
 <h2>Limits of these results</h2>
 {_CAVEATS}""",
         facts,

@@ -24,7 +24,8 @@ _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; margin: 2.5rem auto;
        max-width: 62rem; padding: 0 1.5rem; }
 h1 { font-size: 1.6rem; margin: 0 0 .3rem; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem; }
-p.lead { color: #555; margin-top: 0; } figure { margin: 1.2rem 0; }
+p.lead { color: #555; margin-top: 0; } .verdict { font-size: 1.1rem; max-width: 50rem; }
+figure { margin: 1.2rem 0; }
 figcaption, .note { color: #555; font-size: .88rem; max-width: 50rem; }
 figure img { width: 100%; height: auto; }
 .wide { overflow-x: auto; }
@@ -98,8 +99,7 @@ def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
         f"""{body}
 <h2>Run</h2>
 <dl>{facts_list}</dl>
-<h2>Configuration</h2>
-<pre>{escape(dump_config(config))}</pre>""",
+<details><summary>Configuration</summary><pre>{escape(dump_config(config))}</pre></details>""",
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.config import LawConfig
 from tautscope.dof import NamedDof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
@@ -126,7 +127,7 @@ class DofResult:
         "Largest step of the command over that of the reference: how hard the motor works while it "
         "crosses the slack.",
         "number",
-        goal=5.0,
+        goal=LawConfig().free_gain,
     )
 
 

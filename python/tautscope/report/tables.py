@@ -105,6 +105,16 @@ def operator_to_json(results: Mapping[NamedDof, Figures]) -> dict[str, dict[str,
     return {dof.label: finite(asdict(figures)) for dof, figures in results.items()}
 
 
+def triple(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: str) -> str:
+    """The median of a figure of each DOF, in words."""
+    row = next(row for row in rows if row.name == name)
+    texts = []
+    for dof, found in combine(results, "median").items():
+        unit = f" {dof.display_unit}" if row.kind == "length" else ""
+        texts.append(f"{cell(row, dof, getattr(found, name))}{unit}")
+    return " / ".join(texts)
+
+
 def summary(results: Sequence[dict[NamedDof, DofResult]]) -> dict[str, Any]:
     """Median figures of the seeds by DOF in display units, and under ``worst`` the worst ones."""
     middle, bad = combine(results, "median"), combine(results, "worst")

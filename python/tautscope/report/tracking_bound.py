@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.config import Config
+from tautscope.config import Config, LawConfig
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
 from tautscope.report.metrics import reduction, tracking_rms
@@ -19,7 +19,7 @@ from tautscope.report.rows import ARTICLE
 Floats = NDArray[np.float64]
 Pair = tuple[float, float]
 
-GAIN_LIMIT = 5.0
+GAIN_LIMIT = LawConfig().free_gain
 """Largest speed of the command over that of the reference, in half widths."""
 TIP_GAIN = 2.0
 """Largest speed of the tip over that of the reference, in half widths."""
@@ -86,7 +86,7 @@ def track_ideal_plays(
     With the recent direction w of the reference's motion (du1, r du2), forgotten over a travel of
     0.1 mm, the command moves towards
 
-        u + h w / |w|,    |dc / h| <= 5 |du / h|,    |dq / h| <= 2 |du / h|
+        u + h w / |w|,    |dc / h| <= 20 |du / h|,    |dq / h| <= 2 |du / h|
 
     with norms over insertion and rotation. Bending is the case of one DOF. At the start c = q = u.
 

@@ -4,6 +4,8 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct LawSettings {
+    /// `K_b`: largest speed of the command over that of the reference.
+    pub free_gain: f64,
     /// Largest speed of the predicted tip over that of the reference.
     pub tip_gain: f64,
     /// Half of the travel of the reference in which its direction reverses.

@@ -60,8 +60,6 @@ pub struct VectorLaw<const N: usize> {
     transmission: Transmission<N>,
     /// Unit over `width_limit`: the bounds compare DOFs in `width_limit`, as the limiter of the command does.
     weight: [f64; N],
-    /// `K_b` of each group.
-    gain: [f64; N],
     /// Largest |dc| in a tick.
     step_limit: [f64; N],
     /// Most by which |dc| - |du| grows in a tick.
@@ -94,8 +92,6 @@ pub struct VectorLaw<const N: usize> {
 /// Bounds of the law for N DOFs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds<const N: usize> {
-    /// `K_b`, 1 or above.
-    pub gain: [f64; N],
     /// Largest slack that is compensated [m or rad], in which the bounds compare DOFs.
     pub width_limit: [f64; N],
     /// Largest |dc| / period [m/s or rad/s].
@@ -116,25 +112,17 @@ impl<const N: usize> VectorLaw<N> {
         transmission: Transmission<N>,
         bounds: &Bounds<N>,
     ) -> Result<Self, ConfigError> {
-        for gain in bounds.gain {
-            let is_gain = gain.is_finite() && gain >= 1.0;
-            require(is_gain, "free_gain", gain, "finite, 1 or above")?;
-        }
+        let gain = settings.free_gain;
+        let is_gain = gain.is_finite() && gain >= 1.0;
+        require(is_gain, "free_gain", gain, "finite, 1 or above")?;
         let tip_gain = settings.tip_gain;
         require(tip_gain >= 1.0, "tip_gain", tip_gain, "1 or above")?;
         require_positive("direction_travel", settings.direction_travel)?;
         require_positive("change_rate", settings.change_rate)?;
         let friction = *transmission.friction();
-        let mut gain = [f64::INFINITY; N];
-        for (own, group) in bounds.gain.into_iter().zip(friction.group()) {
-            if let Some(gain) = gain.get_mut(group) {
-                *gain = gain.min(own);
-            }
-        }
         Ok(Self {
             settings,
             weight: over(transmission.unit(), bounds.width_limit),
-            gain,
             step_limit: bounds
                 .speed
                 .map(|speed| speed * bounds.period * BELOW_LIMIT),
@@ -189,10 +177,9 @@ impl<const N: usize> VectorLaw<N> {
         self.target = self.within_limits(target, relative, &slack);
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
-        let mut command = self.command;
+        let (mut command, gain) = (self.command, self.settings.free_gain);
         for group in 0..N {
             let members = self.transmission.friction().members(group);
-            let gain = self.gain.get(group).copied().unwrap_or(1.0);
             let own = only(members, moved);
             if own.iter().all(|own| *own == 0.0) {
                 continue;
@@ -203,7 +190,7 @@ impl<const N: usize> VectorLaw<N> {
                     .surplus
                     .get(group)
                     .map_or(0.0, |last| if has_turned { 0.0 } else { *last });
-            let step = self.bounded_step(members, gain, surplus, relative, own);
+            let step = self.bounded_step(members, surplus, relative, own);
             let faster = (self.norm(step) - self.norm(own)).max(0.0);
             if let Some(last) = self.surplus.get_mut(group) {
                 *last = faster;
@@ -336,7 +323,6 @@ impl<const N: usize> VectorLaw<N> {
     fn bounded_step(
         &self,
         members: [bool; N],
-        gain: f64,
         surplus: f64,
         reference: [f64; N],
         motion: [f64; N],
@@ -351,7 +337,8 @@ impl<const N: usize> VectorLaw<N> {
         if length == 0.0 {
             return step;
         }
-        let mut share = ((gain * moved).min(moved + surplus) / length).min(1.0);
+        let fastest = self.settings.free_gain * moved;
+        let mut share = (fastest.min(moved + surplus) / length).min(1.0);
         let dofs = step.iter().zip(self.step_limit);
         for ((step, limit), dof) in dofs.zip(self.transmission.dofs()) {
             share = share.min(limit / (step.abs() * dof.unit));

@@ -231,7 +231,6 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
             plays: Plays::REST,
         };
         let bounds = Bounds {
-            gain: dofs.map(|dof| dof.free_gain.min(dof.gain_limit)),
             width_limit: settings.safety.width_limit,
             speed: settings.safety.command_speed,
             period: settings.control.period,

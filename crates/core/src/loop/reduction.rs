@@ -8,6 +8,7 @@ use crate::estimation::history::{Entry, History};
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
 use crate::model::features::FeatureModel;
+use crate::supervision::command_limiter::CommandLimiters;
 use crate::supervision::monitors::{Monitors, SENSORS};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; measurements update the estimate of the hysteresis.
@@ -50,12 +51,14 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         storage: S,
     ) -> Result<Self, ConfigError> {
         let control = &settings.control;
-        let friction = if P::IS_COUPLED {
-            settings.friction
+        let (friction, gain) = if P::IS_COUPLED {
+            (settings.friction, [settings.law.free_gain; N])
         } else {
-            Friction::independent()
+            let own = settings.dofs.map(|dof| dof.gain_limit);
+            (Friction::independent(), own)
         };
-        let monitors = Monitors::new(&settings.safety, &settings.dofs, control.period, friction)?;
+        let limiters = CommandLimiters::new(&settings.safety, gain, control.period, friction)?;
+        let monitors = Monitors::new(&settings.safety, &settings.dofs, control.period, limiters)?;
         Ok(Self {
             profile: make(monitors.play_limits())?,
             view,

@@ -3,7 +3,6 @@
 use crate::dof::{Friction, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 use crate::math::linear::square;
-use crate::settings::DofSettings;
 use crate::supervision::settings::SafetySettings;
 
 /// Share by which rounding may exceed the common bound of DOFs that share a friction.
@@ -141,18 +140,18 @@ pub struct CommandLimiters<const N: usize> {
 }
 
 impl<const N: usize> CommandLimiters<N> {
-    /// The limiters before the first command, for a control period in s.
+    /// The limiters before the first command, for the largest |dc| / |du| of each DOF and a control period in s.
     ///
     /// # Errors
     /// A limit is not above 0, a `gain_limit` below 1, or the ends of a `command_travel` are not in order.
     pub fn new(
         safety: &SafetySettings<N>,
-        dofs: &[DofSettings; N],
+        gain_limit: [f64; N],
         period: f64,
         friction: Friction<N>,
     ) -> Result<Self, ConfigError> {
-        let mut limiters = dofs.map(|dof| CommandLimiter {
-            gain_limit: dof.gain_limit,
+        let mut limiters = gain_limit.map(|gain_limit| CommandLimiter {
+            gain_limit,
             step_limit: period,
             travel: (f64::NAN, f64::NAN),
             lead_limit: f64::NAN,

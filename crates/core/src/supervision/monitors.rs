@@ -2,7 +2,6 @@
 
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::Friction;
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
@@ -60,7 +59,7 @@ pub struct Monitors<const N: usize> {
 }
 
 impl<const N: usize> Monitors<N> {
-    /// Supervision of N DOFs with a control period in s; those that share a friction are bounded together.
+    /// Supervision of N DOFs with a control period in s.
     ///
     /// # Errors
     /// A setting is out of range.
@@ -68,7 +67,7 @@ impl<const N: usize> Monitors<N> {
         safety: &SafetySettings<N>,
         dofs: &[DofSettings; N],
         period: f64,
-        friction: Friction<N>,
+        limiters: CommandLimiters<N>,
     ) -> Result<Self, ConfigError> {
         let mut play_limits = [PlayLimit::NONE; N];
         if !safety.off.contains(Flag::WidthLimit) {
@@ -79,7 +78,7 @@ impl<const N: usize> Monitors<N> {
         }
         Ok(Self {
             gate: ReferenceGate::new(safety, dofs, period)?,
-            limiters: CommandLimiters::new(safety, dofs, period, friction)?,
+            limiters,
             frames: [FrameGate::new(safety, dofs)?; SENSORS],
             rates: [FrameRate::NEW; SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,

@@ -1,6 +1,6 @@
 //! Speed limit of the reference: a reference that is too fast is followed at the limit, and lags.
 
-use crate::error::{ConfigError, require_positive};
+use crate::error::{ConfigError, require, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
@@ -49,7 +49,7 @@ impl<const N: usize> ReferenceLimiter<N> {
     /// The limiter of a reference at rest, for a control period in s.
     ///
     /// # Errors
-    /// A time or a speed is not a finite number above 0.
+    /// A time or a speed is not a finite number above 0, or a `gain_limit` is below 1.
     pub fn new(
         safety: &SafetySettings<N>,
         dofs: &[DofSettings; N],
@@ -59,7 +59,10 @@ impl<const N: usize> ReferenceLimiter<N> {
         require_positive("reference_time", safety.reference_time)?;
         let mut step_limit = safety.command_speed;
         for (limit, dof) in step_limit.iter_mut().zip(dofs) {
-            *limit *= period / dof.gain_limit * (1.0 - ROUNDING);
+            let gain = dof.gain_limit;
+            let is_gain = gain.is_finite() && gain >= 1.0;
+            require(is_gain, "gain_limit", gain, "finite, 1 or above")?;
+            *limit *= period / gain * (1.0 - ROUNDING);
             require_positive("command_speed", *limit)?;
         }
         let decay = libm::exp(-period / safety.reference_time);

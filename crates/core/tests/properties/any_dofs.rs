@@ -5,7 +5,6 @@ use crate::article::play::{Play, PlayState};
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;
 use crate::r#loop::paper::{Paper, StateEstimation};
-use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::input_device::InputDeviceMonitor;
@@ -56,9 +55,8 @@ fn motion() -> impl Strategy<Value = f64> {
 }
 
 fn limiters<const N: usize>(group: [usize; N], gain_limit: f64) -> CommandLimiters<N> {
-    let dofs = dofs_in(units()).map(|dof| DofSettings { gain_limit, ..dof });
     let friction = Friction::new(group, [1.0; N]).unwrap();
-    CommandLimiters::new(&safety_in(units()), &dofs, PERIOD, friction).unwrap()
+    CommandLimiters::new(&safety_in(units()), [gain_limit; N], PERIOD, friction).unwrap()
 }
 
 /// Length of a motion over the DOFs of a group, in `width_limit`.
@@ -232,8 +230,8 @@ fn supervised<const N: usize>(group: [usize; N], half_width: f64) -> (Monitors<N
     for (dof, unit) in dofs.iter_mut().zip(units::<N>()) {
         (dof.delta_minus, dof.delta_plus) = (-half_width * unit, half_width * unit);
     }
-    let friction = Friction::new(group, [1.0; N]).unwrap();
-    let monitors = Monitors::new(&safety_in(units()), &dofs, PERIOD, friction).unwrap();
+    let limiters = limiters(group, dofs[0].gain_limit);
+    let monitors = Monitors::new(&safety_in(units()), &dofs, PERIOD, limiters).unwrap();
     let law = Article::with_estimation(&dofs, monitors.play_limits(), Measured).unwrap();
     (monitors, law)
 }

@@ -2,13 +2,12 @@
 
 use crate::dof::Friction;
 use crate::error::ConfigError;
-use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::{PERIOD, dofs, safety_in};
+use super::support::{PERIOD, safety_in};
 
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![8 => -300.0..300.0, 1 => any::<f64>(), 1 => Just(f64::NAN)]
@@ -19,9 +18,7 @@ fn settings() -> SafetySettings<1> {
 }
 
 fn with(settings: &SafetySettings<1>, gain_limit: f64) -> Result<CommandLimiters<1>, ConfigError> {
-    let [_, dof, _] = dofs();
-    let dof = DofSettings { gain_limit, ..dof };
-    CommandLimiters::new(settings, &[dof], PERIOD, Friction::independent())
+    CommandLimiters::new(settings, [gain_limit], PERIOD, Friction::independent())
 }
 
 /// A limiter whose DOF moves by itself.

@@ -257,7 +257,6 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
     let (mut truth, mut random) = (Truth::new(half, centre, 1.0), Random(2013));
     let mut direct = Direct::new();
     let bounds = Bounds {
-        gain: [5.0],
         width_limit: [2.0 * UNIT],
         speed: [40.0 * UNIT],
         period: 0.005,

@@ -108,6 +108,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         },
         safety: *safety,
         law: LawSettings {
+            free_gain: 20.0,
             tip_gain: 1.85,
             direction_travel: 0.02,
             change_rate: 0.01,

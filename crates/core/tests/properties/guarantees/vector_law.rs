@@ -7,12 +7,16 @@ use crate::estimation::measurement::Linear;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::model::plays::COEFFICIENTS;
 use crate::model::slack::Slack;
+use crate::supervision::command_limiter::CommandLimiters;
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Law, Monitors};
 use nalgebra::{SMatrix, SVector};
 
 use super::super::support::{PERIOD, UNITS, dofs, safety, settings};
-use super::{Count, LIMIT, Random, steps, walk};
+use super::{Count, Random, steps, walk};
+
+/// `K_b` of the law.
+const LIMIT: f64 = 20.0;
 
 /// The vector law, with the bounds checked at every call.
 struct CheckedLaw {
@@ -30,7 +34,6 @@ impl CheckedLaw {
         let transmission = settings.of_loop().unwrap().transmission().unwrap();
         let width_limit = settings.safety.width_limit;
         let bounds = Bounds {
-            gain: dofs().map(|dof| dof.free_gain),
             width_limit,
             speed: settings.safety.command_speed,
             period: PERIOD,
@@ -251,7 +254,8 @@ fn bounds_of_the_supervised_vector_law() {
 fn supervised_walk(seed: u64, wanted: u64) -> Count {
     let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
     let shaft = Friction::new([0, 0, 2], [1.0; 3]).unwrap();
-    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, shaft).unwrap();
+    let limiters = CommandLimiters::new(&safety(), [LIMIT; 3], PERIOD, shaft).unwrap();
+    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, limiters).unwrap();
     let (mut reference, mut time, mut ticks) = ([0.0; 3], 0.0, 0);
     let mut led = [0.0_f64; 3];
     let mut speed = [0.0; 3];
