@@ -25,8 +25,8 @@ KEYS = ("fx", "fy", "cx", "cy")
 
 @pytest.fixture(scope="module")
 def images() -> list[np.ndarray]:
-    """The board in 20 poses, seed 0."""
-    return rendered(CONFIG, 20)
+    """The board in 16 poses, seed 0."""
+    return rendered(CONFIG, 16)
 
 
 @pytest.fixture

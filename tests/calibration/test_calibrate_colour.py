@@ -24,7 +24,7 @@ SEED = 4
 @pytest.fixture(scope="module")
 def motion() -> ImageSequence:
     """Images of a rig that differs from its configuration."""
-    config = load_config()
+    config = load_config().replace(**{"twin.frame_rate": 5.0})
     twin = Twin(draw_rig(config, SEED))
     try:
         return record_motion(twin, config)
@@ -35,7 +35,9 @@ def motion() -> ImageSequence:
 def test_the_twin_is_calibrated(capsys: Capture, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     # Weights that find no band.
-    rig.write_text("[vision]\nweights = [1.0, -1.0, -1.0]\nthreshold = 250.0\n")
+    rig.write_text(
+        "[vision]\nweights = [1.0, -1.0, -1.0]\nthreshold = 250.0\n[twin]\nframe_rate = 5.0\n"
+    )
     options = ("--twin", "--seed", str(SEED), "--config", str(rig), "--write", "--json")
     assert main([*COMMAND, *options]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -31,7 +31,7 @@ def collector(is_stream: bool = False) -> ViewCollector:
 
 def test_many_poses_suffice() -> None:
     views = collector()
-    for image in rendered(CONFIG, 30):
+    for image in rendered(CONFIG, 20):
         views.offer(image)
     views.check()
     assert views.coverage.covered.all()

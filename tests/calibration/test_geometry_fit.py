@@ -156,7 +156,7 @@ def test_widths_that_never_rest_are_no_doubt(instrument: Instrument, seed: int) 
 def test_a_twin_is_calibrated_by_its_images() -> None:
     """The second detection finds bands that the wrong geometry has missed, and agrees with it."""
     case = Case(3)
-    rig, shares = Twin(case.actual), []
+    rig, shares = Twin(case.actual.replace(**{"twin.frame_rate": 12.5})), []
     try:
         recording = sweep(rig, case.told, duration=25.0, progress=shares.append)
     finally:
@@ -171,7 +171,7 @@ def test_a_twin_is_calibrated_by_its_images() -> None:
 
 @pytest.mark.parametrize("kind", ["mirrored", "bands exchanged", "wrong sign"])
 def test_a_record_that_the_model_cannot_explain_is_not_plausible(kind: str) -> None:
-    recording, _ = simulate()
+    recording, _ = simulate(duration=30.0)
     features, motors = recording.features.copy(), recording.motors.copy()
     if kind == "mirrored":
         features[:, [0, 2]] = told().camera.width - 1 - features[:, [0, 2]]

@@ -46,8 +46,8 @@ def test_motors_pose_and_what_does_not_move_the_tip() -> None:
 def test_a_configuration_alone_is_a_rig() -> None:
     config = load_config("colonoscope")
     rig = rig_maker("tautscope:PlayRig")(config)
-    motion = motion_of(config, 1, 30.0)
-    runs = [run_experiment(rig, motion, config, on).tracking_rms(15.0) for on in (False, True)]
+    motion = motion_of(config, 1, 20.0)
+    runs = [run_experiment(rig, motion, config, on).tracking_rms(10.0) for on in (False, True)]
     assert (runs[1] < 0.3 * runs[0]).all()
     with pytest.raises(ConfigError, match=r"dof: got 'none'"):
         PlayRig(Config())

@@ -52,7 +52,7 @@ TautscopeResult create(const std::string &toml) {
 
 void check_configuration(const std::string &toml) {
     FAILS(create(replaced(toml, "[control]", "[controls]")), CONFIG, "control");
-    FAILS(create(replaced(toml, "free_gain", "fre_gain")), CONFIG, "insertion.fre_gain: unknown key");
+    FAILS(create(replaced(toml, "gain_limit", "gain_limt")), CONFIG, "insertion.gain_limt: unknown key");
     FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = -1.0")), CONFIG, "period: got -1");
     FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = \"fast\"")), CONFIG, "fast");
     const auto detector = [](const std::string &text) { return thrown([&] { tautscope::Detector created(text); }); };

@@ -214,13 +214,13 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
             _figure9_caption(demo),
         )
     }
-    if demo.compensated.snapshot is not None:
-        figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
-        drawn["fig5"] = figure5, FIGURE5_CAPTION
     drawn["operator_motion"] = (
         draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
         _OPERATOR_CAPTION.format(demo.seeds[0]),
     )
+    if demo.compensated.snapshot is not None:
+        figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
+        drawn["fig5"] = figure5, FIGURE5_CAPTION
     with new_folder(folder) as place:
         demo.operator_compensated.write(place, "_operator_motion")
         demo.operator_uncompensated.write(place, "_operator_motion_uncompensated")

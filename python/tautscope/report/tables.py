@@ -13,6 +13,9 @@ from tautscope.dof import Dof, NamedDof
 from tautscope.report.results import ROWS, DofResult, Figures, combine
 from tautscope.report.rows import ARTICLE, Row, rows_of
 
+SMALLEST = 0.001
+"""Length that a sentence tells from nothing [mm or rad]."""
+
 
 def in_display_unit(row: Row, dof: NamedDof, value: float) -> float:
     """A figure [m or rad] in the display unit."""
@@ -110,8 +113,11 @@ def triple(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: st
     row = next(row for row in rows if row.name == name)
     texts = []
     for dof, found in combine(results, "median").items():
-        unit = f" {dof.display_unit}" if row.kind == "length" else ""
-        texts.append(f"{cell(row, dof, getattr(found, name))}{unit}")
+        value, text = getattr(found, name), cell(row, dof, getattr(found, name))
+        if row.kind == "length":
+            is_small = abs(in_display_unit(row, dof, value)) < SMALLEST
+            text = f"{f'below {SMALLEST}' if is_small else text} {dof.display_unit}"
+        texts.append(text)
     return " / ".join(texts)
 
 

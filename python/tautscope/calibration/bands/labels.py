@@ -73,7 +73,8 @@ def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
     labels[cv2.dilate(every, kernel) > 0] = IGNORED
     for label, band in zip((BAND_A, BAND_B), bands, strict=False):
         labels[cv2.erode((band > 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = label
-    labels[(image >= SATURATED).any(axis=2)] = IGNORED
+    blue, green, red = np.moveaxis(image >= SATURATED, 2, 0)
+    labels[blue | green | red] = IGNORED
     return LabelledImage(image, labels)
 
 
