@@ -143,13 +143,14 @@ impl<const N: usize> CommandLimiters<N> {
     /// The limiters before the first command, for the largest |dc| / |du| of each DOF and a control period in s.
     ///
     /// # Errors
-    /// A limit is not above 0, a `gain_limit` below 1, or the ends of a `command_travel` are not in order.
+    /// A limit or the period is not above 0, a `gain_limit` below 1, or the ends of a `command_travel` are not in order.
     pub fn new(
         safety: &SafetySettings<N>,
         gain_limit: [f64; N],
         period: f64,
         friction: Friction<N>,
     ) -> Result<Self, ConfigError> {
+        require_positive("period", period)?;
         let mut limiters = gain_limit.map(|gain_limit| CommandLimiter {
             gain_limit,
             step_limit: period,
