@@ -5,7 +5,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "COMMAND_SPEED",
     "DETECTORS",
     "MEANINGS",
     "MOST_DOFS",
@@ -37,7 +36,6 @@ MEANINGS: tuple[str, ...]
 MOST_DOFS: int
 MOST_SENSORS: int
 MOST_VALUES: int
-COMMAND_SPEED: float
 MOST_RANGE: float
 SPEED: float
 

@@ -73,7 +73,6 @@ mod _core {
         module.add("MOST_DOFS", tautscope_core::DOFS)?;
         module.add("MOST_SENSORS", tautscope_core::SENSORS)?;
         module.add("MOST_VALUES", tautscope_core::VALUES)?;
-        module.add("COMMAND_SPEED", tautscope_config::COMMAND_SPEED)?;
         module.add("MOST_RANGE", tautscope_config::MOST_RANGE)?;
         module.add("SPEED", tautscope_config::SPEED)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -15,8 +15,8 @@ const UPDATES: f64 = 50.0;
 const COUNTS: f64 = 250.0;
 /// `speed` without a value, in `width_limit` per s.
 pub const SPEED: f64 = 2.0;
-/// `command_speed` without a value, over `gain_limit` times `speed`.
-pub const COMMAND_SPEED: f64 = 2.0;
+/// Largest `command_speed`, over `gain_limit` times `speed`.
+const COMMAND_SPEED: f64 = 2.0;
 /// Widest `range`, in `width_limit`, and without a value that about 0.
 pub const MOST_RANGE: f64 = 100.0;
 
@@ -199,7 +199,7 @@ impl AxisSettings {
 
     fn command_speed(&self) -> f64 {
         let usual = COMMAND_SPEED * self.gain_limit * self.speed();
-        self.command_speed.unwrap_or(usual)
+        self.command_speed.map_or(usual, |own| own.min(usual))
     }
 
     fn settings(&self, article: &core::DofSettings, compensate: bool) -> core::DofSettings {

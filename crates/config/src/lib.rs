@@ -6,6 +6,6 @@ mod axes;
 mod document;
 
 pub use any_loop::{AnyLoop, Profile, Selection};
-pub use axes::{AxesSettings, AxisSettings, COMMAND_SPEED, MOST_RANGE, SPEED};
+pub use axes::{AxesSettings, AxisSettings, MOST_RANGE, SPEED};
 #[cfg(feature = "toml")]
 pub use document::{Configuration, Dof, Error};

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from tautscope._core import COMMAND_SPEED, MOST_RANGE, SPEED
+from tautscope._core import MOST_RANGE, SPEED
 from tautscope.config.fields import LIMITS, Gain, NonNegative, Positive, Vector3
 from tautscope.config.section import Section, require, require_at_most
 
@@ -42,8 +42,8 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     gain_limit: Gain = 5.0
     """K_b of profile ``paper``."""
     command_speed: Annotated[float, Meta(gt=0, le=10_000)] | None = None
-    """Largest speed of the command [m or rad per s]; else 2 gain_limit times `speed`. Not above
-    what the motors of [drives] can do."""
+    """Largest speed of the command [m or rad per s]; at most 2 gain_limit times `speed`, and what
+    the motors of [drives] can do."""
     delta_minus: float = 0.0
     """Initial offset at the negative contact [m or rad]."""
     delta_plus: float = 0.0
@@ -59,12 +59,6 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def largest_speed(self) -> float:
         """Largest speed of the reference that is followed [m or rad per s]."""
         return SPEED * self.width_limit if self.speed is None else self.speed
-
-    @property
-    def largest_command_speed(self) -> float:
-        """Largest speed of the command [m or rad per s]."""
-        usual = COMMAND_SPEED * self.gain_limit * self.largest_speed
-        return usual if self.command_speed is None else self.command_speed
 
     @property
     def label(self) -> str:

@@ -18,17 +18,20 @@ def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
     No command is faster than the motors of ``[drives]``, which would refuse it.
     """
     document: dict[str, Any] = msgspec.to_builtins(config)
-    usual = document["safety"]["command_speed"] = list(config.safety.command_speed)
-    for index, speed in enumerate(motor_speeds(config)):
-        if not config.dof:
-            usual[index] = min(usual[index], speed)
-        else:
-            entry = config.dof[index]
-            document["dof"][index]["command_speed"] = min(entry.largest_command_speed, speed)
+    told = [dof.command_speed for dof in config.dof] or config.safety.command_speed
+    speeds = [
+        speed if own is None else min(own, speed)
+        for own, speed in zip(told, motor_speeds(config), strict=False)
+    ]
+    if config.dof:
+        for entry, speed in zip(document["dof"], speeds, strict=False):
+            entry["command_speed"] = speed
+    elif speeds:
+        document["safety"]["command_speed"] = speeds
     if config.dof:
         # Not used with [[dof]]: only its defaults that are no lengths.
         document["insertion"] = msgspec.to_builtins(Config().insertion)
-    if not compensate:
+    elif not compensate:
         for dof in Dof:
             document[dof.label]["free_gain"] = 1.0
         document["law"]["free_gain"] = 1.0

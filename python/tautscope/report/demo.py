@@ -111,13 +111,13 @@ class Demo:
     def verdict(self) -> tuple[str, str]:
         """A sentence on the slack that remains, and one on an operator's motion."""
         left = [
-            f"{tables.triple(results, ROWS, 'compensated')} with profile {name}"
+            f"{tables.median_text(results, ROWS, 'compensated')} with profile {name}"
             for name, results in self.by_profile.items()
         ]
-        reduction = tables.triple(self.operator_results, OPERATOR_ROWS, "reduction")
+        slack = tables.median_text(self.results, ROWS, "uncompensated")
+        reduction = tables.median_text(self.operator_results, OPERATOR_ROWS, "reduction")
         return (
-            f"Slow sines: of {tables.triple(self.results, ROWS, 'uncompensated')} of slack there "
-            f"remain {', '.join(left)}.",
+            f"Slow sines: of {slack} of slack there remain {', '.join(left)}.",
             f"An operator's motion of all at once: tracking error less by {reduction}.",
         )
 

@@ -108,7 +108,7 @@ def operator_to_json(results: Mapping[NamedDof, Figures]) -> dict[str, dict[str,
     return {dof.label: finite(asdict(figures)) for dof, figures in results.items()}
 
 
-def triple(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: str) -> str:
+def median_text(results: Sequence[dict[NamedDof, Any]], rows: Sequence[Row], name: str) -> str:
     """The median of a figure of each DOF, in words."""
     row = next(row for row in rows if row.name == name)
     texts = []

@@ -86,7 +86,7 @@ def track_ideal_plays(
     With the recent direction w of the reference's motion (du1, r du2), forgotten over a travel of
     0.1 mm, the command moves towards
 
-        u + h w / |w|,    |dc / h| <= 20 |du / h|,    |dq / h| <= 2 |du / h|
+        u + h w / |w|,    |dc / h| <= K_b |du / h|,    |dq / h| <= 2 |du / h|
 
     with norms over insertion and rotation. Bending is the case of one DOF. At the start c = q = u.
 
