@@ -9,6 +9,7 @@ from hysteresis.tables import Row, show
 
 IDEAS: dict[str, dict[str, Any]] = {
     "bound of the predicted tip's speed": {"law.tip_gain": 50.0},
+    "free gain beyond the article's": {"law.free_gain": 5.0},
     "rate limit of the estimate in use": {
         "law.change_rate": 1e9,
         "safety.unusual": ["law.change_rate"],
