@@ -40,17 +40,27 @@ fn steps(default: u64) -> u64 {
 }
 
 /// The common bound of insertion and rotation, in the limits of their width; nothing moves while both rest.
-fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, place: &str) {
+fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, gain: f64, place: &str) {
     let [first, second, _] = support::safety().width_limit;
     let norm = |x: PerDof<f64>| (x[0] / first).hypot(x[1] / second);
     let (dc, du) = (norm(moved), norm(pulled));
     assert!(du > 0.0 || dc == 0.0, "{place}: {dc} for {du}");
     // The travel, which the offset of the reference gate may have, is ten times the limit of the width.
-    let rounding = 160.0 * f64::EPSILON;
+    let rounding = 32.0 * gain * f64::EPSILON;
     assert!(
-        du.is_nan() || dc <= 5.0 * du * (1.0 + 1e-9) + rounding,
+        du.is_nan() || dc <= gain * du * (1.0 + 1e-9) + rounding,
         "{place}: {dc} for {du}"
     );
+}
+
+/// The most that a command may move, in motions of the reference.
+fn gain_limit<P: BandProfile>() -> f64 {
+    let settings = support::settings(&support::safety());
+    if P::IS_COUPLED {
+        settings.law.free_gain
+    } else {
+        settings.insertion.gain_limit
+    }
 }
 
 /// Motion, rest, tremor and jumps of the reference, late ticks, images of every kind, and an operator who re-engages: every
@@ -58,6 +68,7 @@ fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, place: &str) {
 fn stress<P: BandProfile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
     let mut chance = Chance(seed);
     let truth = model();
+    let gain = gain_limit::<P>();
     let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);
     let mut command = reduction.step(reference, None, time);
     let (mut updates, mut worst) = (0_u64, Reaction::None);
@@ -101,13 +112,13 @@ fn stress<P: BandProfile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
         let moved = [0, 1, 2].map(|dof| now[dof] - command[dof]);
         let pulled = [0, 1, 2].map(|dof| next[dof] - reference[dof]);
         if P::IS_COUPLED {
-            check_coupled(moved, pulled, &format!("seed {seed}, tick {tick}"));
+            check_coupled(moved, pulled, gain, &format!("seed {seed}, tick {tick}"));
         }
         for dof in 0..3 {
             let (dc, du) = (moved[dof], pulled[dof]);
             // The offset of the reference gate, which is not observed here, is as large as the travel.
             let (least, largest) = limits.command_travel[dof];
-            let rounding = 16.0 * f64::EPSILON * (largest - least);
+            let rounding = 4.0 * gain * f64::EPSILON * (largest - least);
             let facts = format!("seed {seed}, tick {tick}, DOF {dof}: {dc} for {du}");
             assert!(now[dof].is_finite(), "{facts}");
             assert!((least..=largest).contains(&now[dof]), "{facts}");
@@ -123,7 +134,7 @@ fn stress<P: BandProfile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
                 continue;
             }
             assert!(dc * du >= 0.0 || dc.abs() <= rounding, "{facts}");
-            assert!(dc.abs() <= 5.0 * du.abs() + rounding, "{facts}");
+            assert!(dc.abs() <= gain * du.abs() + rounding, "{facts}");
         }
         command = now;
         for (reference, next) in reference.iter_mut().zip(next) {
