@@ -70,9 +70,11 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Standard deviation of the state estimate in a still scene [m, rad, rad]. Three times this
     must be below contact_tolerance times update_distance, or noise is taken for contact."""
     tremor_swing: Positive = 0.5
-    """Least one-way motion of the reference that is a tremor [in update_distance]."""
+    """Least one-way motion of the reference, without its slow part, that is a tremor
+    [in update_distance]."""
     tremor_rate: Positive = 4.0
-    """Reversals of the reference, within width_limit, that are a tremor [1/s]."""
+    """Reversals of the reference, without its slow part, within width_limit, that are a tremor
+    [1/s]."""
     ahead_limit: Positive = 0.2
     """How much farther than the reference the tip may move in a stroke; beyond it there is less
     slack than is compensated [in width_limit]."""

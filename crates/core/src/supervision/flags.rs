@@ -77,7 +77,7 @@ flags! {
     Monitor = "monitor",
     /// A command would have moved faster than `command_speed`.
     CommandJump = "command_jump",
-    /// The reference reverses more than `tremor_rate` times a second within the slack.
+    /// The reference without its slow part reverses more than `tremor_rate` times a second within the slack.
     Tremor = "tremor",
     /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = "overcompensation",

@@ -10,20 +10,24 @@ use crate::supervision::turning_points::TurningPoints;
 
 /// Time constant of the rate of reversals, in s: `tremor_rate` counts those of a second.
 const TREMOR_TIME: f64 = 1.0;
+/// Time constant of the operator's intended motion, in s: a tremor of 6 to 12 Hz is faster, a voluntary motion slower.
+const INTENTION_TIME: f64 = 0.1;
 
 /// Monitors reference and tip of every DOF.
 ///
 /// ```text
-/// tremor             rate <- exp(-period / 1 s) rate + reversals,   rate > tremor_rate
+/// tremor             s <- s + (u - s) period / 0.1 s,
+///                    rate <- exp(-period / 1 s) rate + reversals of u - s,   rate > tremor_rate
 /// overcompensation   d (m - m0) > ahead_ratio d (u - u0)   and
 ///                    d (m - m0) - d (u - u0) > ahead   and   d (m - u) > ahead,
 ///                    or d (delta0 - delta) > offset_decrease ahead
 /// limit cycle        cycle_swings swings of u and as many of m, each at least cycle_growth times the one before it
 /// ```
 ///
-/// with the reference u, the measured tip m, the contact offset delta that the stroke uses, their values u0, m0 and delta0
+/// with the reference u, its slow part s, the measured tip m, the contact offset delta that the stroke uses, their values u0, m0 and delta0
 /// when the reference turned last, the direction d since then, and ahead = `ahead_limit` `width_limit`. A tremor's
-/// swings are at least `tremor_swing` and shorter than `width_limit`.
+/// swings are at least `tremor_swing` and shorter than `width_limit`; without the slow part, a small one hardly reverses a
+/// reference that moves.
 ///
 /// While the slack is crossed, the tip stays behind its reference; it moves farther only if there was less slack than was
 /// compensated. The three conditions together exclude a tip that had been left behind before, and a bias of the images.
@@ -34,6 +38,8 @@ pub struct MotionMonitor<const N: usize> {
     axes: [DofMotion; N],
     /// exp(-period / 1 s).
     decay: f64,
+    /// Share by which the slow part follows the reference in a tick.
+    follow: f64,
     settings: SafetySettings<N>,
 }
 
@@ -68,6 +74,7 @@ impl<const N: usize> MotionMonitor<N> {
         Ok(Self {
             axes: zip_with(axes, ahead, |axis, ahead| DofMotion { ahead, ..axis }),
             decay: libm::exp(-period / TREMOR_TIME),
+            follow: (period / INTENTION_TIME).min(1.0),
             settings: *safety,
         })
     }
@@ -78,7 +85,9 @@ impl<const N: usize> MotionMonitor<N> {
         let dofs = self.axes.iter_mut().zip(reference);
         for ((axis, reference), width) in dofs.zip(self.settings.width_limit) {
             axis.reversals *= self.decay;
-            let swing = axis.every_tick.update(reference);
+            let slow = axis.slow.get_or_insert(reference);
+            let swing = axis.shake.update(reference - *slow);
+            *slow += self.follow * (reference - *slow);
             if swing.is_some_and(|swing| swing < width) {
                 axis.reversals += 1.0;
             }
@@ -113,8 +122,9 @@ impl<const N: usize> MotionMonitor<N> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct DofMotion {
     ahead: f64,
-    /// Turning points of the reference, by every control tick.
-    every_tick: TurningPoints,
+    /// Slow part of the reference, and the turning points of the rest, by every control tick.
+    slow: Option<f64>,
+    shake: TurningPoints,
     reversals: f64,
     /// Turning points of the reference and of the tip, by every image.
     reference: TurningPoints,
@@ -137,7 +147,8 @@ impl DofMotion {
         };
         Self {
             ahead: f64::NAN,
-            every_tick: TurningPoints::new(dof.update_distance * tremor_swing),
+            slow: None,
+            shake: TurningPoints::new(dof.update_distance * tremor_swing),
             reversals: 0.0,
             reference: TurningPoints::new(dof.update_distance),
             tip: TurningPoints::new(dof.update_distance),

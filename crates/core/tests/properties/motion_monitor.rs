@@ -143,6 +143,32 @@ fn a_tremor_is_four_reversals_a_second_or_more_within_the_slack() {
     }
 }
 
+#[test]
+fn a_tremor_that_reverses_no_moving_reference_is_seen_and_a_voluntary_motion_is_none() {
+    let tremor = |time: f64| 0.6 * UNIT * (core::f64::consts::TAU * 8.0 * time).sin();
+    let steady = |time: f64| 40.0 * UNIT * time;
+    // Minimum-jerk moves to and fro, each over 20 units in 1 s.
+    let voluntary = |time: f64| {
+        let (count, s) = (time.floor(), time.fract());
+        let moved = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+        20.0 * UNIT
+            * if count % 2.0 == 0.0 {
+                moved
+            } else {
+                1.0 - moved
+            }
+    };
+    let increments = (0..400).map(|tick| f64::from(tick) * PERIOD);
+    assert!(increments.clone().all(|time| {
+        let next = time + PERIOD;
+        steady(next) + tremor(next) > steady(time) + tremor(time)
+    }));
+    let both = |time: f64| steady(time) + tremor(time);
+    assert_eq!(raised(2.0, both, steady), Flags::of(Flag::Tremor));
+    assert_eq!(raised(2.0, steady, steady), Flags::NONE);
+    assert_eq!(raised(10.0, voluntary, voluntary), Flags::NONE);
+}
+
 /// An oscillation whose amplitude is so many times as large after each swing.
 fn growing(growth: f64, period: f64) -> impl Fn(f64) -> f64 {
     move |time| {
