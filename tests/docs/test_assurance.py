@@ -1,10 +1,8 @@
 """The pages for whoever assesses risks: hazards, software of others, known anomalies."""
 
 import re
-import shutil
 
 import assurance
-import pytest
 from common.paths import ROOT
 
 DOCS = ROOT / "docs"
@@ -15,12 +13,10 @@ def test_the_files_of_the_hazards_are_up_to_date() -> None:
     assert assurance.with_controls(SAFETY) == SAFETY, "run `uv run docs/assurance.py`"
 
 
-@pytest.mark.skipif(shutil.which("cargo") is None, reason="cargo lists the crates")
 def test_the_list_of_software_is_up_to_date() -> None:
     page = (DOCS / "soup.md").read_text(encoding="utf-8")
     assert page == assurance.soup(), "run `uv run docs/assurance.py`"
     assert "| numpy | " in page
-    assert re.search(r"[:,] pyo3 \d", page)
 
 
 def test_every_hazard_has_a_control_in_a_file() -> None:
