@@ -9,8 +9,8 @@ from tautscope.errors import MissingExtraError
 
 MODULES = {
     "analysis": ("matplotlib", "polars", "rich", "scipy"),
-    "twin": ("cv2", "matplotlib", "mcap", "mujoco", "rich"),
-    "console": ("cv2", "mcap", "websockets"),
+    "twin": ("cv2", "matplotlib", "mcap", "mujoco", "rich", "rosbags"),
+    "console": ("cv2", "mcap", "rosbags", "websockets"),
     "ros2": ("cv2", "mcap", "rosbags", "zenoh"),
     "hardware": (
         "av",
@@ -21,6 +21,7 @@ MODULES = {
         "mcap",
         "polars",
         "rich",
+        "rosbags",
         "ruamel",
         "serial",
     ),

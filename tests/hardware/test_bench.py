@@ -35,8 +35,9 @@ RUN = "from tautscope.cli import main; raise SystemExit(main())"
 
 
 def bench_config(folder: Path, **changes: Any) -> Config:
-    """Slow cycles and long timeouts, for a busy computer."""
+    """Slow motion and cycles, and long timeouts, for a busy computer."""
     document = {
+        "law": {"free_gain": 5.0},
         "control": {"period": CYCLE},
         "camera": {
             "source": {

@@ -45,8 +45,9 @@ def bench_config(protocol: str, folder: Path) -> Config:
 
 
 def slow_config(name: str, folder: Path) -> Config:
-    """A shipped configuration for a busy computer: slow cycles, long timeouts, small images."""
+    """A shipped configuration for a busy computer: slow motion and cycles, long timeouts."""
     document = to_document(load_config(name))
+    document["law"]["free_gain"] = 5.0
     document["control"]["period"] = CYCLE
     document["drives"] |= {
         "channel": str(folder / "servos"),

@@ -151,8 +151,8 @@ def test_a_pose_by_a_matrix_is_shown_as_its_quaternion(tracked: tuple[Path, Reco
         if not isinstance(event, Update):
             continue
         assert isinstance(event.measurement, Pose)
-        shown = topics.decode(topics.POSE, event.raw[topics.POSE])["pose"]["orientation"]
-        x, y, z, w = (shown[name] for name in "xyzw")
+        shown = topics.decode(topics.POSE, event.raw[topics.POSE]).pose.orientation
+        x, y, z, w = (getattr(shown, name) for name in "xyzw")
         # A vector v is turned by v + 2 w (u x v) + 2 u x (u x v), with u = (x, y, z).
         u, matrix = np.array([x, y, z]), np.asarray(event.measurement.orientation)
         for vector, expected in zip(np.eye(3), matrix.T, strict=True):
@@ -250,7 +250,7 @@ def test_a_measurement_of_another_kind_is_refused(labels: tuple[str, str], count
 
 def test_a_log_has_at_most_eight_dofs() -> None:
     header = header_messages(RunInfo(axes(8, width_limit=1.0), True, ()), 0)
-    text = topics.decode(topics.CONFIG, header[topics.CONFIG])["data"]
+    text = topics.decode(topics.CONFIG, header[topics.CONFIG]).data
     ninth = '\n[[dof]]\nname = "ninth"\nwidth_limit = 1.0\n'
     header[topics.CONFIG] = topics.encode(topics.CONFIG, {"data": text + ninth})
     with pytest.raises(ConfigError, match="dof: got '9 entries'"):

@@ -10,11 +10,10 @@ from driving import START, commands, drive
 from ros2.lockstep import compare
 from ros2.peers import JOINTS, Peers
 from tautscope.config import load_config
-from tautscope.log import cdr
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.rig import Frame
-from tautscope.ros2 import messages, types
+from tautscope.ros2 import messages
 from tautscope.ros2.lifecycle import State
 from tautscope.ros2.wire import Qos
 
@@ -115,12 +114,10 @@ def test_the_tip_has_stamp_0_while_markers_are_lost(both: Peers) -> None:
     assert [each.size for each in delta.layout.dim] == [3, 2]
 
 
-def test_what_is_published_is_decoded_by_our_other_decoder(both: Peers) -> None:
+def test_the_state_is_published_as_diagnostics(both: Peers) -> None:
     diagnostics = both.other.subscription("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
     both.delivered(resend=True)
     both.clock.now += 2 * 10**9
     both.control.serve()
-    message = both.received(diagnostics, "diagnostics")
-    found = cdr.decode("diagnostic_msgs/msg/DiagnosticArray", types.encode(message))
-    (status,) = found["status"]
-    assert (status["name"], status["message"]) == ("tautscope", "DISABLED")
+    (status,) = both.received(diagnostics, "diagnostics").status
+    assert (status.name, status.message) == ("tautscope", "DISABLED")

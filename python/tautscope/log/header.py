@@ -62,7 +62,7 @@ def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]
     """
     try:
         texts = {
-            topic: topics.decode(topic, messages[topic])["data"]
+            topic: topics.decode(topic, messages[topic]).data
             for topic in (topics.CONFIG, topics.RUN, topics.VERSIONS)
         }
         config = from_document(tomllib.loads(texts[topics.CONFIG]))

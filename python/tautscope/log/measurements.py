@@ -54,12 +54,12 @@ def read_measurement(messages: Mapping[str, bytes], dofs: Sequence[str]) -> Meas
     covariance = None
     if topics.COVARIANCE in messages:
         matrix = topics.decode(topics.COVARIANCE, messages[topics.COVARIANCE])
-        sides = [side["size"] for side in matrix["layout"]["dim"]]
-        covariance = np.array(matrix["data"], np.float64).reshape(sides)
-    labels = [side["label"] for side in found["layout"]["dim"]]
+        sides = [side.size for side in matrix.layout.dim]
+        covariance = np.array(matrix.data).reshape(sides)
+    labels = [side.label for side in found.layout.dim]
     with suppress(ValueError):
         kind, names = labels
-        captured_at, sensor, *numbers = found["data"]
+        captured_at, sensor, *numbers = found.data.tolist()
         made = _made(kind, np.array(numbers), captured_at, covariance, int(sensor))
         if names == ",".join((*_TIMES, *_names(made, dofs))):
             return made

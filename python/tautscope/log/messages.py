@@ -100,9 +100,9 @@ class Codec:
             for topic in (topics.REFERENCE, topics.COMMAND, topics.APPLIED, topics.TRUTH)
             if topic in messages
         }
-        time = _decoded(messages, topics.TICK)["data"]
+        time = _decoded(messages, topics.TICK).data
         sample = Sample(time, joints[topics.APPLIED], None, joints.get(topics.TRUTH))
-        made_at = _decoded(messages, topics.MADE_AT)["data"] if topics.MADE_AT in messages else None
+        made_at = _decoded(messages, topics.MADE_AT).data if topics.MADE_AT in messages else None
         return sample, joints[topics.REFERENCE], joints[topics.COMMAND], made_at
 
     def update(
@@ -158,13 +158,12 @@ class Codec:
             RecordError: The degrees of freedom are not those of the configuration.
         """
         update = _decoded(messages, topics.UPDATE)
-        known = dict(
-            zip(update["layout"]["dim"][0]["label"].split(","), update["data"], strict=True)
-        )
-        known["status"] = _decoded(messages, topics.STATUS)["status"][0]["message"]
+        names = update.layout.dim[0].label.split(",")
+        known = dict(zip(names, update.data.tolist(), strict=True))
+        known["status"] = _decoded(messages, topics.STATUS).status[0].message
         delta = _decoded(messages, topics.DELTA)
-        self._check_names(topics.DELTA, delta["layout"]["dim"][0]["label"].split(","))
-        deltas = np.array(delta["data"], np.float64).reshape(len(self._names), 2)
+        self._check_names(topics.DELTA, delta.layout.dim[0].label.split(","))
+        deltas = delta.data.reshape(len(self._names), 2)
         row = tuple(
             kind.type(known.get(name, np.nan if kind.kind == "f" else 0)).item()
             for name, kind in zip(self._columns, self._kinds, strict=True)
@@ -181,8 +180,8 @@ class Codec:
 
     def _positions(self, messages: Mapping[str, bytes], topic: str) -> Floats:
         joints = _decoded(messages, topic)
-        self._check_names(topic, joints["name"])
-        return np.array(joints["position"], np.float64)
+        self._check_names(topic, joints.name)
+        return np.array(joints.position)
 
     def _check_names(self, topic: str, found: Sequence[str]) -> None:
         if list(found) != self._names:
@@ -230,5 +229,5 @@ def warning_message(stamp: int, text: str) -> bytes:
     )
 
 
-def _decoded(messages: Mapping[str, bytes], topic: str) -> dict[str, Any]:
+def _decoded(messages: Mapping[str, bytes], topic: str) -> Any:
     return topics.decode(topic, messages[topic])

@@ -51,9 +51,11 @@ class Update:
     @property
     def status(self) -> dict[str, Any]:
         """Level, name and message of its status, and further texts by key under ``values``."""
-        (status,) = topics.decode(topics.STATUS, self.raw[topics.STATUS])["status"]
-        texts = {each["key"]: each["value"] for each in status["values"]}
-        return {**status, "values": texts}
+        (status,) = topics.decode(topics.STATUS, self.raw[topics.STATUS]).status
+        texts = {each.key: each.value for each in status.values}
+        return {"level": status.level, "name": status.name, "message": status.message} | {
+            "values": texts
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +115,8 @@ class Log:
         tick = next((event for event in self.events.values() if isinstance(event, Tick)), None)
         if tick is None:
             raise RecordError("log", str(self.path), "a log with a control tick")
-        stamp = topics.decode(topics.APPLIED, tick.raw[topics.APPLIED])["header"]["stamp"]
-        return msg.Clock(tick.sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
+        stamp = topics.decode(topics.APPLIED, tick.raw[topics.APPLIED]).header.stamp
+        return msg.Clock(tick.sample.time, stamp.sec * 10**9 + stamp.nanosec)
 
     @property
     def missing(self) -> int:
@@ -144,7 +146,7 @@ class Log:
             and (message.channel_id, message.sequence) == (channel, index)
         )
         codec = ImageCodec(self.config.camera, self.config.recording)
-        return codec.decode(topics.decode(topics.IMAGE, data)["data"])
+        return codec.decode(topics.decode(topics.IMAGE, data).data.tobytes())
 
     def recording(self) -> Recording:
         """Trace and frames as `run_experiment` returned them; the snapshot is None."""
@@ -175,7 +177,7 @@ def read_log(path: str | PathLike[str]) -> Log:
         if topic == topics.IMAGE:
             images[record.sequence] = raw.offset, record.channel_id
         elif topic == topics.WARNING:
-            warnings.append(topics.decode(topic, record.data)["msg"])
+            warnings.append(topics.decode(topic, record.data).msg)
         elif topic in topics.TYPES:
             groups[record.sequence][topic] = record.data
     info, versions = read_header(groups.pop(0, {}))
@@ -187,7 +189,7 @@ def read_log(path: str | PathLike[str]) -> Log:
         elif codec.is_update(messages):
             events[index] = Update(*codec.read_update(messages), messages)
         elif topics.EVENT in messages:
-            text = topics.decode(topics.EVENT, messages[topics.EVENT])["data"]
+            text = topics.decode(topics.EVENT, messages[topics.EVENT]).data
             events[index] = Request(text, messages)
     return Log(
         file,

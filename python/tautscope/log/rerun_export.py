@@ -155,18 +155,18 @@ class _Chunks:
         for _, topic, record in read_messages(self._log.path, Damage()):
             now = self._clock.start + (record.log_time - self._clock.epoch) / 1e9
             if topic == topics.WARNING:
-                text = topics.decode(topic, record.data)["msg"]
+                text = topics.decode(topic, record.data).msg
                 yield self._text("warning", now, text, rr.TextLogLevel.WARN)
             elif topic == topics.EVENT:
-                text = topics.decode(topic, record.data)["data"]
+                text = topics.decode(topic, record.data).data
                 yield self._text("event", now, text, rr.TextLogLevel.INFO)
             elif topic == topics.IMAGE and self._log.has_image(record.sequence):
                 event = self._log.events[record.sequence]
                 assert isinstance(event, Update)
                 image = topics.decode(topic, record.data)
-                kind = image["format"].partition("; ")[2].split()[0]  # as `ImageCodec.format`
+                kind = image.format.partition("; ")[2].split()[0]  # as `ImageCodec.format`
                 columns = rr.EncodedImage.columns(
-                    blob=[bytes(image["data"])], media_type=[f"image/{kind}"]
+                    blob=[bytes(image.data)], media_type=[f"image/{kind}"]
                 )
                 yield Chunk.from_columns("endoscope/image", self._at(event.row[0]), columns)
                 self.images += 1

@@ -63,7 +63,7 @@ UPDATE_TOPICS = {ESTIMATE, DELTA, STATUS, UPDATE}
 
 def encode(topic: str, message: cdr.Message) -> bytes:
     """A message of a topic as CDR."""
-    return cdr.encode(TYPES[topic], message)
+    return cdr.encode(cdr.make(TYPES[topic], **message))
 
 
 def encode_all(messages: Mapping[str, cdr.Message]) -> dict[str, bytes]:
@@ -71,6 +71,6 @@ def encode_all(messages: Mapping[str, cdr.Message]) -> dict[str, bytes]:
     return {topic: encode(topic, message) for topic, message in messages.items()}
 
 
-def decode(topic: str, data: bytes) -> dict[str, Any]:
+def decode(topic: str, data: bytes) -> Any:
     """The message of a topic from CDR; errors as `cdr.decode`."""
     return cdr.decode(TYPES[topic], data)

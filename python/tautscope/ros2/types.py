@@ -1,22 +1,19 @@
-"""ROS 2 types: definitions, type hashes, and CDR, by rosbags.
-
-The definitions are those of ROS 2 Jazzy; `crtk_msgs` and the services are added from their texts.
-"""
+"""ROS 2 types beside those of logs: definitions of `crtk_msgs` and of services, and type hashes."""
 
 from __future__ import annotations
 
-import struct
 from functools import cache
 from typing import Any
 
-import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
+from rosbags.typesys import get_types_from_msg
 
-from tautscope.errors import MessageError
+from tautscope.errors import MessageError, RecordError
+from tautscope.log import cdr
+from tautscope.log.cdr import encode, make, store
+
+__all__ = ["decode", "encode", "header", "make", "stamp", "type_hash"]
 
 MESSAGES = {
     "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\n"
@@ -56,19 +53,15 @@ SERVICES = {
 }
 """Services -> definitions of request and response."""
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
-_LITTLE_ENDIAN = b"\x00\x01"
-_BYTES = {"byte": "uint8", "char": "uint8"}
-"""Names of ROS that NumPy lacks."""
 
 
-@cache
-def _store() -> Typestore:
-    store = get_typestore(Stores.ROS2_JAZZY)
+def _register() -> None:
+    known = store()
     for name, text in MESSAGES.items():
-        store.register(get_types_from_msg(text, name))
+        known.register(get_types_from_msg(text, name))
     # A char of ROS is a uint8 in the description that the hash is of.
     info = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\n"
-    store.fielddefs[_EVENT_INFO] = ([], _fields(info + "int64 sequence_number"))
+    known.fielddefs[_EVENT_INFO] = ([], _fields(info + "int64 sequence_number"))
     for name, (request, response) in SERVICES.items():
         parts: list[tuple[str, list[tuple[str, FieldDesc]]]] = [
             (f"{name}_Request", _fields(request)),
@@ -88,8 +81,7 @@ def _store() -> Typestore:
             kind: ([], fields)
             for kind, fields in (*parts, (f"{name}_Event", event), (name, members))
         }
-        store.register(types)
-    return store
+        known.register(types)
 
 
 def _fields(text: str) -> list[tuple[str, FieldDesc]]:
@@ -101,36 +93,7 @@ def _fields(text: str) -> list[tuple[str, FieldDesc]]:
 @cache
 def type_hash(kind: str) -> str:
     """The REP 2016 hash of a message (``pkg/msg/Name``) or service (``pkg/srv/Name``)."""
-    return _store().hash_rihs01(kind)
-
-
-def make(kind: str, **fields: Any) -> Any:
-    """A message of a type from its fields; one that is not given is 0 or empty.
-
-    A message in it may be a dictionary of its fields.
-    """
-    for name, described in _store().fielddefs[kind][1]:
-        fields[name] = _value(described, fields.get(name))
-    return _store().types[kind](**fields)
-
-
-def _value(described: FieldDesc, value: Any) -> Any:
-    """The value of a field by its description; None is 0 or empty."""
-    if described[0] is Nodetype.NAME:
-        return value if hasattr(value, "__msgtype__") else make(described[1], **value or {})
-    if described[0] is Nodetype.BASE:
-        zero = "" if described[1][0] == "string" else 0
-        return zero if value is None else value
-    element, length = described[1]
-    if element[0] is Nodetype.BASE and element[1][0] != "string":
-        name = _BYTES.get(element[1][0], element[1][0])
-        return np.zeros(length, name) if value is None else np.asarray(value, name)
-    return [_value(element, each) for each in value or ()]
-
-
-def encode(message: Any) -> bytes:
-    """A message as little-endian CDR."""
-    return bytes(_store().serialize_cdr(message, message.__msgtype__))
+    return store().hash_rihs01(kind)
 
 
 def decode(kind: str, data: bytes) -> Any:
@@ -140,11 +103,9 @@ def decode(kind: str, data: bytes) -> Any:
         MessageError: The bytes are not little-endian CDR of this type.
     """
     try:
-        if data[:2] != _LITTLE_ENDIAN:
-            raise ValueError(f"header {data[:4].hex()}")
-        return _store().deserialize_cdr(data, kind)
-    except (SerdeError, struct.error, ValueError, IndexError, AssertionError, TypeError) as error:
-        raise MessageError(kind, str(error), "a message in little-endian CDR") from None
+        return cdr.decode(kind, data)
+    except RecordError as error:
+        raise MessageError(error.field, error.value, error.allowed) from None
 
 
 def stamp(nanoseconds: int) -> Any:
@@ -156,3 +117,6 @@ def stamp(nanoseconds: int) -> Any:
 def header(nanoseconds: int, frame: str) -> Any:
     """std_msgs/msg/Header for a wall clock time [ns since 1970]; 0 is a time that is not known."""
     return make("std_msgs/msg/Header", stamp=stamp(nanoseconds), frame_id=frame)
+
+
+_register()
