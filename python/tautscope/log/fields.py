@@ -23,7 +23,7 @@ def stamp_of(nanoseconds: int) -> dict[str, int]:
 def joint_state(header: Message, names: list[str], values: Iterable[float]) -> dict[str, Any]:
     """sensor_msgs/msg/JointState: positions (n,) [m or rad] of the degrees of freedom."""
     position = [float(value) for value in values]
-    return {"header": header, "name": names, "position": position, "velocity": (), "effort": ()}
+    return {"header": header, "name": names, "position": position}
 
 
 def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:
@@ -33,4 +33,4 @@ def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:
         {"label": label, "size": size, "stride": int(np.prod(sizes[place:]))}
         for place, (label, size) in enumerate(axes.items())
     ]
-    return {"layout": {"dim": dim, "data_offset": 0}, "data": [float(value) for value in data]}
+    return {"layout": {"dim": dim}, "data": [float(value) for value in data]}

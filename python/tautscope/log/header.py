@@ -79,7 +79,6 @@ def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]
 def _camera_info(camera: CameraConfig, stamp: int) -> dict[str, Any]:
     """sensor_msgs/msg/CameraInfo."""
     intrinsics = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
-    window = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
     return {
         "header": header_of(stamp, "endoscope"),
         "height": camera.height,
@@ -89,7 +88,4 @@ def _camera_info(camera: CameraConfig, stamp: int) -> dict[str, Any]:
         "k": intrinsics,
         "r": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         "p": (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, *[0.0] * 3, 1.0, 0.0),
-        "binning_x": 0,
-        "binning_y": 0,
-        "roi": window,
     }

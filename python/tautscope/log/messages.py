@@ -224,9 +224,7 @@ def request_messages(request: str) -> Messages:
 def warning_message(stamp: int, text: str) -> bytes:
     """The message of a warning."""
     fields: dict[str, Any] = {"stamp": stamp_of(stamp), "level": _WARN_LEVEL, "msg": text}
-    return topics.encode(
-        topics.WARNING, fields | {"name": "tautscope", "file": "", "function": "", "line": 0}
-    )
+    return topics.encode(topics.WARNING, fields | {"name": "tautscope"})
 
 
 def _decoded(messages: Mapping[str, bytes], topic: str) -> Any:

@@ -12,6 +12,7 @@ from rosbags.typesys import get_types_from_msg
 from tautscope.errors import MessageError, RecordError
 from tautscope.log import cdr
 from tautscope.log.cdr import encode, make, store
+from tautscope.log.fields import header_of, stamp_of
 
 __all__ = ["decode", "encode", "header", "make", "stamp", "type_hash"]
 
@@ -110,13 +111,12 @@ def decode(kind: str, data: bytes) -> Any:
 
 def stamp(nanoseconds: int) -> Any:
     """builtin_interfaces/msg/Time for a wall clock time [ns since 1970]."""
-    sec, nanosec = divmod(nanoseconds, 10**9)
-    return make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
+    return make("builtin_interfaces/msg/Time", **stamp_of(nanoseconds))
 
 
 def header(nanoseconds: int, frame: str) -> Any:
     """std_msgs/msg/Header for a wall clock time [ns since 1970]; 0 is a time that is not known."""
-    return make("std_msgs/msg/Header", stamp=stamp(nanoseconds), frame_id=frame)
+    return make("std_msgs/msg/Header", **header_of(nanoseconds, frame))
 
 
 _register()

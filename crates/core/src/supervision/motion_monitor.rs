@@ -24,10 +24,10 @@ const INTENTION_TIME: f64 = 0.1;
 /// limit cycle        cycle_swings swings of u and as many of m, each at least cycle_growth times the one before it
 /// ```
 ///
-/// with the reference u, its slow part s, the measured tip m, the contact offset delta that the stroke uses, their values u0, m0 and delta0
-/// when the reference turned last, the direction d since then, and ahead = `ahead_limit` `width_limit`. A tremor's
-/// swings are at least `tremor_swing` and shorter than `width_limit`; without the slow part, a small one hardly reverses a
-/// reference that moves.
+/// with the reference u, its slow part s, the measured tip m, the contact offset delta that the stroke uses, the values
+/// u0, m0 and delta0 when the reference turned last, the direction d since then, and ahead = `ahead_limit` `width_limit`. A tremor's
+/// swings are at least `tremor_swing` and shorter than `width_limit`; a small one reverses no reference that
+/// moves, only what is left without the slow part.
 ///
 /// While the slack is crossed, the tip stays behind its reference; it moves farther only if there was less slack than was
 /// compensated. The three conditions together exclude a tip that had been left behind before, and a bias of the images.
