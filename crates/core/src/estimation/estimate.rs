@@ -8,7 +8,7 @@ use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission, gain_row,
+    COEFFICIENTS, GAIN_ROW, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission,
 };
 use crate::model::slack::{GAINS, Slack};
 
@@ -102,7 +102,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         }
         let mut kalman = Kalman::new(mean, variance, COEFFICIENTS);
         for index in 0..N {
-            kalman.know_sum(&of_dof(index, &gain_row()), GAIN_DEVIATION);
+            kalman.know_sum(&of_dof(index, &GAIN_ROW), GAIN_DEVIATION);
         }
         for (index, (start, unit)) in start_std.into_iter().zip(transmission.unit()).enumerate() {
             require_positive("start_deviation", start)?;
@@ -277,13 +277,13 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
                 libm::sqrt(product_at(first, row, cross.as_slice()).max(0.0))
             };
             let half = slack.half_width / dof.unit;
-            let mut by_half = dof.width_row();
-            for (entry, gain) in by_half.iter_mut().zip(gain_row()) {
+            let mut by_half = dof.width;
+            for (entry, gain) in by_half.iter_mut().zip(GAIN_ROW) {
                 *entry = (*entry - half * gain) / slack.gain;
             }
             *found = SlackDeviation {
                 half_width: dof.unit * deviation(&by_half),
-                gain: deviation(&gain_row()),
+                gain: deviation(&GAIN_ROW),
             };
         }
         found
@@ -325,7 +325,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Moves the means to the nearest ones, in the metric of their covariance, whose gains are within [`GAINS`].
     fn bound_gains(&mut self) {
         for index in 0..N {
-            let (first, row) = (index * COEFFICIENTS, gain_row());
+            let (first, row) = (index * COEFFICIENTS, GAIN_ROW);
             let gain = product_at(first, &row, self.kalman.mean.as_slice());
             let excess = gain - gain.clamp(GAINS.0, GAINS.1);
             if excess != 0.0 {

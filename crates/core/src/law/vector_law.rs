@@ -6,7 +6,7 @@ use crate::error::{ConfigError, require, require_positive};
 use crate::law::direction::Direction;
 use crate::law::settings::LawSettings;
 use crate::model::plays::{
-    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, gain_row, product,
+    COEFFICIENTS, GAIN_ROW, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, product,
 };
 use crate::model::slack::Slack;
 
@@ -81,8 +81,9 @@ pub struct VectorLaw<const N: usize> {
     target: [f64; N],
     /// Travel of the reference, in units.
     travel: [f64; N],
-    /// Coefficients in use.
+    /// Coefficients in use, and the slack that they make.
     rows: [Row; N],
+    slack: [Slack; N],
     /// Share of the compensation in use: all with 1, none with 0. A change is bumpless.
     pub share: f64,
     /// Whether the limits of the contact offsets keep the tip from the reference by more than a tenth of a unit.
@@ -139,6 +140,7 @@ impl<const N: usize> VectorLaw<N> {
             target: [0.0; N],
             travel: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
+            slack: [Slack::default(); N],
             share: 1.0,
             is_limited: false,
         })
@@ -159,6 +161,7 @@ impl<const N: usize> VectorLaw<N> {
         }
         let Some(last) = self.reference.replace(reference) else {
             self.rows = *rows;
+            self.slack = self.transmission.slack(rows);
             return reference;
         };
         let motion = subtract(reference, last);
@@ -172,9 +175,8 @@ impl<const N: usize> VectorLaw<N> {
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
-        let slack = self.transmission.slack(&self.rows);
-        let target = self.next_target(relative, &slack);
-        self.target = self.within_limits(target, relative, &slack);
+        let target = self.next_target(relative);
+        self.target = self.within_limits(target, relative);
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let (mut command, gain) = (self.command, self.settings.free_gain);
@@ -239,13 +241,15 @@ impl<const N: usize> VectorLaw<N> {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
         self.travel = zip_with(self.travel, moved, |sum, own| sum + own);
-        let by_gain = gain_row();
+        if self.rows == *rows {
+            return;
+        }
         let dofs = self.transmission.dofs().iter();
         let dofs = dofs.zip(self.plays.regressors()).zip(self.travel);
         for ((used, estimated), ((dof, phi), own)) in self.rows.iter_mut().zip(rows).zip(dofs) {
             let deflection = dof.deflection(estimated, 1.0) - dof.deflection(used, 1.0);
             let tip = product(&phi, estimated) - product(&phi, used);
-            let steeper = product(&by_gain, estimated) - product(&by_gain, used);
+            let steeper = product(&GAIN_ROW, estimated) - product(&GAIN_ROW, used);
             let change = (deflection.abs().max(tip.abs())).max(FAR * steeper.abs());
             let known = START / own;
             let rate = self.settings.change_rate * (1.0 + known * known);
@@ -255,13 +259,19 @@ impl<const N: usize> VectorLaw<N> {
                 *used += share * (new - *used);
             }
         }
+        self.slack = self.transmission.slack(&self.rows);
     }
 
     /// The target for a reference (N,) in units.
-    fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
+    fn next_target(&self, reference: [f64; N]) -> [f64; N] {
         let direction = self.direction.value();
         let mut steady = self.target;
-        let dofs = self.transmission.dofs().iter().zip(&self.rows).zip(slack);
+        let dofs = self
+            .transmission
+            .dofs()
+            .iter()
+            .zip(&self.rows)
+            .zip(&self.slack);
         let given = reference.into_iter().zip(direction);
         let dofs = steady.iter_mut().zip(dofs).zip(given);
         for ((to, ((dof, row), slack)), (reference, direction)) in dofs {
@@ -283,7 +293,7 @@ impl<const N: usize> VectorLaw<N> {
                 .iter_mut()
                 .zip(steady)
                 .zip(reference.into_iter().zip(tip))
-                .zip(slack);
+                .zip(&self.slack);
             for (((to, steady), (reference, tip)), slack) in dofs {
                 *to += (reference - tip) / slack.gain;
                 *to = to
@@ -295,13 +305,9 @@ impl<const N: usize> VectorLaw<N> {
     }
 
     /// The target with contact offsets within their limits.
-    fn within_limits(
-        &self,
-        mut target: [f64; N],
-        reference: [f64; N],
-        slack: &[Slack; N],
-    ) -> [f64; N] {
-        let dofs = target.iter_mut().zip(reference).zip(slack).zip(self.limits);
+    fn within_limits(&self, mut target: [f64; N], reference: [f64; N]) -> [f64; N] {
+        let dofs = target.iter_mut().zip(reference).zip(&self.slack);
+        let dofs = dofs.zip(self.limits);
         for ((((to, reference), slack), limit), unit) in dofs.zip(self.transmission.unit()) {
             let [minus, plus] = slack.offsets();
             if limit.exceeds(minus, plus) {

@@ -136,6 +136,8 @@ pub struct Radii {
     inverse: Lanes,
     /// Motion of a sliding output by the same force, over that of the first DOF of the group.
     ease: Lanes,
+    /// Row whose product with the coefficients is the half width times the gain: [`GAIN_ROW`] times the radius of each play.
+    pub width: Row,
 }
 
 impl<const N: usize> Transmission<N> {
@@ -274,12 +276,18 @@ impl<const N: usize> Transmission<N> {
 
 impl Radii {
     fn new(unit: f64, is_alone: bool, shared: Lanes, ease: Lanes) -> Self {
+        let bent = OWN_RADII.into_iter().step_by(2);
+        let bent = bent.flat_map(|radius| [radius; KNOTS.len()]);
+        let radii = shared.into_iter().chain(OWN_RADII).chain(bent);
+        let mut width = GAIN_ROW;
+        width.iter_mut().zip(radii).for_each(|(a, b)| *a *= b);
         Self {
             unit,
             is_alone,
             shared,
             inverse: shared.map(|half| 1.0 / half),
             ease,
+            width,
         }
     }
 
@@ -337,22 +345,35 @@ pub fn bent(row: &Row, to: f64, direction: f64) -> (f64, f64) {
         })
 }
 
-/// Coefficients whose sum is the gain of a DOF: those of all plays, and of the bent ones their mean slope from -1 to 1.
-pub fn gain_row() -> Row {
-    row_of(1.0, |knot| (1.0 - knot) / 2.0, 0.0)
-}
+/// Row whose product with the coefficients is the gain of a DOF: all plays, and of the bent ones their mean slope from -1 to 1.
+pub const GAIN_ROW: Row = {
+    let [a, b, c] = KNOTS;
+    row_of(1.0, [above(a), above(b), above(c)], 0.0)
+};
+/// Row whose product with the coefficients is the tip in the middle of the slack about the origin: offset, and of the bent
+/// plays the mean from -1 to 1.
+pub const MIDDLE_ROW: Row = {
+    let [a, b, c] = KNOTS;
+    let [a, b, c] = [above(a), above(b), above(c)];
+    row_of(0.0, [a * a, b * b, c * c], 1.0)
+};
 
-/// Coefficients whose sum is the tip in the middle of the slack about the origin: offset, and of the bent plays the mean from -1 to 1.
-pub fn middle_row() -> Row {
-    row_of(0.0, |knot| (1.0 - knot) * (1.0 - knot) / 4.0, 1.0)
+/// Share of the range from -1 to 1 above a knot.
+const fn above(knot: f64) -> f64 {
+    (1.0 - knot) / 2.0
 }
 
 /// The same of each play, by the knot of each bent play, and of the offset.
-fn row_of(play: f64, bent: impl Fn(f64) -> f64, offset: f64) -> Row {
+const fn row_of(play: f64, bent: [f64; KNOTS.len()], offset: f64) -> Row {
     let mut row = [play; COEFFICIENTS];
-    let bends = (0..OWN / 2).flat_map(|_| KNOTS.map(&bent));
-    let rest = row.iter_mut().skip(SHARED + OWN);
-    rest.zip(bends.chain([offset])).for_each(|(a, b)| *a = b);
+    let (_, mut rest) = row.split_at_mut(SHARED + OWN);
+    while let [a, b, c, others @ ..] = rest {
+        [*a, *b, *c] = bent;
+        rest = others;
+    }
+    if let [last] = rest {
+        *last = offset;
+    }
     row
 }
 

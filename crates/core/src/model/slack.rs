@@ -1,6 +1,6 @@
 //! Width, centre and gain of the slack that coefficients of plays make.
 
-use crate::model::plays::{Radii, Row, SHARED, Transmission, gain_row, middle_row, product};
+use crate::model::plays::{GAIN_ROW, MIDDLE_ROW, Row, Transmission, product};
 
 /// Bounds of the gain: outside of them it is another instrument.
 pub const GAINS: (f64, f64) = (0.6, 1.3);
@@ -28,27 +28,14 @@ impl<const N: usize> Transmission<N> {
     pub fn slack(&self, rows: &[Row; N]) -> [Slack; N] {
         let mut found = [Slack::default(); N];
         for ((slack, dof), row) in found.iter_mut().zip(self.dofs()).zip(rows) {
-            let gain = product(&gain_row(), row).clamp(GAINS.0, GAINS.1);
-            let half = product(&dof.width_row(), row) / gain;
+            let gain = product(&GAIN_ROW, row).clamp(GAINS.0, GAINS.1);
+            let half = product(&dof.width, row) / gain;
             *slack = Slack {
                 half_width: dof.unit * half.max(0.0),
-                centre: -dof.unit * product(&middle_row(), row) / gain,
+                centre: -dof.unit * product(&MIDDLE_ROW, row) / gain,
                 gain,
             };
         }
         found
-    }
-}
-
-impl Radii {
-    /// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
-    pub fn width_row(&self) -> Row {
-        let mut row = gain_row();
-        let bent = self.all().skip(SHARED).step_by(2);
-        let radii = self.all().chain(bent.flat_map(|radius| [radius; 3]));
-        row.iter_mut()
-            .zip(radii)
-            .for_each(|(entry, radius)| *entry *= radius);
-        row
     }
 }
