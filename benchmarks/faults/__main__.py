@@ -1,8 +1,7 @@
 """The fault campaign: how far faults move the tip, and whether they are detected.
 
 Every run is compared with the fault-free run: same instrument, noise and motion. 10 mm of slack,
-estimated before the fault; K_b = 5; a reference of up to 12.6 mm/s. `--kind K --seed S` repeats one
-run.
+estimated before the fault; a reference of up to 12.6 mm/s. `--kind K --seed S` repeats one run.
 """
 
 from __future__ import annotations
