@@ -170,7 +170,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_MONITOR = 19,
     // A command would have moved faster than `command_speed`.
     TAUTSCOPE_FLAG_COMMAND_JUMP = 20,
-    // The reference reverses more than `tremor_rate` times a second within the slack.
+    // The reference without its slow part reverses more than `tremor_rate` times a second within the slack.
     TAUTSCOPE_FLAG_TREMOR = 21,
     // The tip has moved farther than the reference since the reference turned.
     TAUTSCOPE_FLAG_OVERCOMPENSATION = 22,

@@ -335,7 +335,7 @@ pub enum TautscopeFlag {
     Monitor = 19,
     /// A command would have moved faster than `command_speed`.
     CommandJump = 20,
-    /// The reference reverses more than `tremor_rate` times a second within the slack.
+    /// The reference without its slow part reverses more than `tremor_rate` times a second within the slack.
     Tremor = 21,
     /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = 22,

@@ -67,7 +67,8 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Vector law of profile ``best``, docs/best.md. All [ours].
 
     Travels are in the unit of each DOF, three quarters of its expected_width, so that one set
-    serves all. delta_minus and delta_plus are those of `DofConfig`.
+    serves all. delta_minus and delta_plus are those of [insertion],
+    [rotation] and [bending].
     """
 
     free_gain: Gain = 20.0
@@ -78,8 +79,8 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     direction_travel: Positive = 0.02
     """Half of the travel of the reference in which its direction reverses."""
     change_rate: Positive = 0.01
-    """Largest change of the contact offsets and of the predicted tip in use, per travel of the
-    reference."""
+    """Change of the contact offsets and of the predicted tip in use per travel of the reference, at
+    most; more at the start, docs/best.md."""
 
 
 class EstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

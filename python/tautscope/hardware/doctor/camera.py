@@ -43,7 +43,7 @@ def check_devices(*, needed: bool) -> CheckResult:
 def check_source(config: CameraConfig) -> list[CheckResult]:
     """Open and test the configured source, and measure its frame rate and age."""
     source = config.source
-    what, piped = f"source {source.url}", f"{DV_PIPE} uv run tautscope doctor CONFIG"
+    what, piped = f"source {source.url}", f"{DV_PIPE} tautscope doctor --config CONFIG"
     if source.url.startswith("pipe:") and sys.stdin.isatty():
         return [CheckResult("camera", what, "missing", "no data on the pipe", piped)]
     if source.url.startswith("/dev/") and not Path(source.url).exists():
