@@ -1,7 +1,7 @@
 """Loops of 1 to 8 degrees of freedom with any sensor of the tip."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -190,6 +190,47 @@ def test_points_of_your_own_kinematics() -> None:
     scale = np.array([1.2, 12e-3])
     np.testing.assert_allclose(report.state_estimate / scale, at_once / scale, atol=0.02)
     np.testing.assert_allclose(loop.predicted_state / scale, tip / scale, atol=0.05)
+
+
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_a_point_that_is_wrong_for_good_is_reported(profile: Literal["best", "paper"]) -> None:
+    camera, loop = Camera(), HysteresisReduction(POINTS.replace(profile=profile))
+    plant = Plays([0.6, 6e-3])
+    for tick in range(6000):
+        time = tick * PERIOD
+        tip = plant(loop.step([0.8 * np.sin(time), 0.012 * np.sin(0.7 * time)], time))
+        if tick % 8 == 0:
+            seen = camera.points(tip)
+            if tick > 2000:
+                seen[0] += [40.0, 30.0]
+            loop.on_points(seen, time)
+        assert tick > 2000 or not loop.supervision.latched
+    assert {"merged", "innovation"} & set(loop.supervision.latched)
+
+
+def test_a_model_that_sees_nothing_is_reported() -> None:
+    loop = HysteresisReduction(axes(1, width_limit=1.0))
+    for tick in range(2000):
+        time = tick * PERIOD
+        loop.step([1.5 * np.sin(0.5 * time)], time)
+        if tick % 8 == 0:
+            values = [0.1 + 1e-6 * tick]
+            report = loop.on_measurement(
+                values, time, [[1e-4]], lambda q: np.nan * q, jacobian=lambda q: np.eye(1)
+            )
+    assert report.status == "held"
+    assert loop.supervision.flags == ("unobservable",)
+
+
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_bands_where_the_model_sees_none_are_lost(profile: Literal["best", "paper"]) -> None:
+    loop = HysteresisReduction(Config(profile=profile))
+    for tick in range(200):
+        loop.step([-0.030, 0.0, 0.9], tick * PERIOD)
+    assert loop.predicted_features(tick * PERIOD) is None
+    report = loop.on_features([350.0, 260.0, 345.0, 190.0], tick * PERIOD)
+    assert report.status == "held"
+    assert report.warnings == ("lost",)
 
 
 def test_a_measurement_of_your_own_needs_no_jacobian() -> None:

@@ -94,17 +94,6 @@ impl Compensator {
         Ok(())
     }
 
-    /// Changes the gain of every axis, 1 for no compensation; the command does not move.
-    fn set_gain(&mut self, py: Python<'_>, free_gain: f64, gain_limit: f64) -> PyResult<()> {
-        for (inner, state) in &mut self.0.all {
-            let changed = inner.with_gain(free_gain, gain_limit);
-            *inner = changed.map_err(errors::config(py))?;
-            let play = state.play();
-            inner.retune(state, play);
-        }
-        Ok(())
-    }
-
     /// The command c; NaN before the first reference.
     #[getter]
     fn command(&self) -> PerAxis {

@@ -45,12 +45,31 @@ impl Selection {
     /// # Errors
     /// A setting is out of range.
     pub fn build_bands(&self, settings: &core::Settings) -> Result<AnyLoop, core::ConfigError> {
-        let storage = vec![core::Entry::BLANK; settings.history_entries()];
+        let storage = vec![core::Entry::BLANK; entries(&settings.control)?];
         Ok(AnyLoop::Bands(match self.profile {
             Profile::Paper => Box::new(Bands::<core::Paper>::new(settings, storage)?),
             Profile::Best => Box::new(Bands::<core::Best>::new(settings, storage)?),
         }))
     }
+}
+
+/// Longest history, as in `python/tautscope/config/control.py`.
+const MOST_TICKS: usize = 1024;
+
+/// Entries of the history that a loop needs.
+///
+/// # Errors
+/// They are more than a history has.
+pub(crate) fn entries(control: &core::ControlSettings) -> Result<usize, core::ConfigError> {
+    let found = core::history_entries(control.history, control.period);
+    if found > MOST_TICKS + 2 {
+        return Err(core::ConfigError {
+            field: "history",
+            value: control.history,
+            allowed: "at most 1024 control periods",
+        });
+    }
+    Ok(found)
 }
 
 type Bands<P> = core::HysteresisReduction<P, Vec<core::Entry>>;

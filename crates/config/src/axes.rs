@@ -5,7 +5,7 @@
 use serde::Deserialize;
 use tautscope_core as core;
 
-use crate::any_loop::{AnyLoop, Profile};
+use crate::any_loop::{AnyLoop, Profile, entries};
 
 // The article's instrument has about these ratios of its lengths to safety.width_limit.
 const OFFSET_LIMIT: f64 = 2.0 / 3.0;
@@ -101,8 +101,7 @@ impl AxesSettings {
             return Err(error("period", period, "a finite number above 0"));
         }
         let settings = self.of_loop::<N>(compensate)?;
-        let entries = core::history_entries(self.control.history, period);
-        let storage = vec![core::Entry::<N>::BLANK; entries];
+        let storage = vec![core::Entry::<N>::BLANK; entries(&self.control)?];
         Ok(AnyLoop::Axes(match self.profile {
             Profile::Paper => Box::new(Axes::<PaperOf<N>, N>::of_axes(&settings, storage)?),
             Profile::Best => Box::new(Axes::<BestOf<N, D>, N>::of_axes(&settings, storage)?),

@@ -78,13 +78,15 @@ const OF_ARTICLE: [&str; 11] = [
 const OF_AXES: [&str; 5] = ["control", "safety", "law", "estimation", "measurement"];
 /// Sections without defaults that only Python reads.
 const OF_PYTHON: [&str; 2] = ["drives", "actuators"];
+/// Numbers of the marker detection that may be negative.
+const SIGNED: [&str; 3] = ["weights", "threshold", "alternatives"];
 
 impl Configuration {
     /// A configuration from TOML: of the article's instrument, or with `[[dof]]` of a robot of yours.
     ///
     /// # Errors
     /// The text is not TOML, a key is unknown or, with `[[dof]]`, of another instrument, or a degree of freedom has no name or a wrong
-    /// unit. Values are checked where they are read.
+    /// unit; or a number is not finite, or of the marker detection negative. Other values are checked where they are read.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let mut given: Table = toml::from_str(text)?;
         let mut table: Table = toml::from_str(DEFAULTS)?;
@@ -125,6 +127,9 @@ impl Configuration {
             let names = [("insertion", "m"), ("rotation", "rad"), ("bending", "rad")];
             names.map(|(name, unit)| Dof::new(name, unit)).into()
         };
+        for (name, value) in &table {
+            check_numbers(value, name)?;
+        }
         Ok(Self { table, dofs })
     }
 
@@ -187,6 +192,25 @@ fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Er
         all.push(entry);
     }
     Ok((Value::Array(all), dofs))
+}
+
+/// No comparison with a number that is not finite would hold, so that each check with it would be off.
+fn check_numbers(value: &Value, name: &str) -> Result<(), Error> {
+    let may_be_negative =
+        !name.starts_with("vision.") || SIGNED.iter().any(|key| name.ends_with(key));
+    match value {
+        Value::Table(own) => own
+            .iter()
+            .try_for_each(|(key, value)| check_numbers(value, &format!("{name}.{key}"))),
+        Value::Array(all) => all.iter().try_for_each(|value| check_numbers(value, name)),
+        Value::Float(number) if !number.is_finite() => Err(Error(format!(
+            "{name}: got {number}, expected a finite number"
+        ))),
+        Value::Float(number) if *number < 0.0 && !may_be_negative => {
+            Err(Error(format!("{name}: got {number}, expected 0 or above")))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn check_kinematics(own: &Value) -> Result<(), Error> {

@@ -100,6 +100,28 @@ fn errors_name_the_key() {
         ("law = 3".into(), "law: got integer, expected a table"),
         ("law.tip_gain = \"three\"".into(), "tip_gain"),
         ("law.tip_gain = 0.5".into(), "tip_gain: got 0.5"),
+        (
+            "law.tip_gain = nan".into(),
+            "law.tip_gain: got NaN, expected a finite number",
+        ),
+        (
+            "camera.camera_from_guide.rotation = [0.1, inf, 0.0]".into(),
+            "camera.camera_from_guide.rotation: got inf",
+        ),
+        (
+            "vision.least_inside = nan".into(),
+            "vision.least_inside: got NaN",
+        ),
+        (
+            "vision.fit.edge_deviation = -1.0".into(),
+            "vision.fit.edge_deviation: got -1, expected 0 or above",
+        ),
+        (
+            "control.history = 2e6".into(),
+            "history: got 2000000, expected at most 1024 control periods",
+        ),
+        (dof("[control]\nhistory = 2e6"), "history: got 2000000"),
+        (dof("range = [-inf, inf]"), "dof.range: got -inf"),
         (dof("[law]\ntip_gain = -1"), "tip_gain: got -1"),
         (dof("[control]\nperiod = 0"), "period: got 0"),
         ("dof = 1".into(), "dof: got integer, expected [[dof]]"),

@@ -283,7 +283,7 @@ typedef struct TautscopeHysteresis {
 
 // Result of an image update; values that are not known are NaN.
 //
-// Set `size` to `sizeof(TautscopeReport)` first. A library with more members than the caller's fills those the caller has.
+// Set `size` to `sizeof(TautscopeReport)` first. A smaller one than the library's is refused.
 typedef struct TautscopeReport {
     // Bytes of the structure as the caller knows it.
     uint32_t size;
@@ -523,7 +523,7 @@ TautscopeResult tautscope_loop_dof(struct TautscopeLoop *handle, size_t dof, con
 // `time` is the caller's clock (s). `made_at` is when the reference was made on that clock (s), NaN if not known.
 //
 // With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
-// `TAUTSCOPE_RESULT_SIZE` nothing is written.
+// `TAUTSCOPE_RESULT_SIZE` or `_NULL_POINTER`, or a handle that cannot be used any more, nothing is written.
 //
 // # Safety
 // The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.

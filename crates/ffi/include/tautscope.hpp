@@ -358,9 +358,12 @@ public:
         return command;
     }
 
-    /// As `step`, without exceptions: with any result but OK, `command` is the last one.
+    /// As `step`, without exceptions: with any result but OK, `command` is the last one; it stays as it is for a reference
+    /// of another size, or a loop that cannot be used any more.
     TautscopeResult try_step(Numbers reference, double time, Values &command, double made_at = unknown) noexcept {
-        command = Values(dofs());
+        if (command.size() != dofs()) {
+            command = Values(dofs(), unknown);
+        }
         return tautscope_loop_step(handle_.get(), reference.size(), reference.data(), made_at, time, command.data());
     }
 

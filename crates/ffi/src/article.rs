@@ -5,7 +5,7 @@ use tautscope_core as core;
 use tautscope_core::DOFS;
 
 use crate::document::config;
-use crate::pointers::{give, numbers, read, take_back};
+use crate::pointers::{give, numbers, take_back};
 use crate::result::{Handle, TautscopeResult, failed, guarded, null, with_handle};
 
 /// Settings of the compensator of a degree of freedom, in its unit.
@@ -94,10 +94,11 @@ unsafe fn each<S: Copy, T>(
     if !(1..=DOFS).contains(&dofs) {
         return Err(size(dofs, "1 to 8"));
     }
+    if settings.is_null() {
+        return Err(null("settings"));
+    }
     // SAFETY: the caller's contract.
-    let first = unsafe { read("settings", settings) }?;
-    // SAFETY: the caller's contract.
-    let all = unsafe { std::slice::from_raw_parts(first, dofs) };
+    let all = unsafe { std::slice::from_raw_parts(settings, dofs) };
     let made = all.iter().enumerate().map(|(dof, own)| {
         build(own).map_err(|error| config(format_args!("degree of freedom {dof}: {error}")))
     });

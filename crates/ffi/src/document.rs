@@ -97,6 +97,12 @@ impl LoopDocument {
         let configuration = parsed(text)?;
         let inner = configuration.build().map_err(wrong)?;
         let sections: LoopSections = configuration.read().map_err(wrong)?;
+        let std = sections.measurement.tip_deviation;
+        if std <= 0.0 {
+            return Err(config(format_args!(
+                "measurement.tip_deviation: got {std}, expected above 0"
+            )));
+        }
         let named = |text: &str| CString::new(text).unwrap_or_default();
         let dofs = configuration.dofs().iter();
         Ok(Self {

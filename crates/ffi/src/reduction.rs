@@ -161,7 +161,7 @@ pub unsafe extern "C" fn tautscope_loop_dof(
 /// `time` is the caller's clock (s). `made_at` is when the reference was made on that clock (s), NaN if not known.
 ///
 /// With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
-/// `TAUTSCOPE_RESULT_SIZE` nothing is written.
+/// `TAUTSCOPE_RESULT_SIZE` or `_NULL_POINTER`, or a handle that cannot be used any more, nothing is written.
 ///
 /// # Safety
 /// The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.

@@ -154,7 +154,7 @@ pub struct TautscopeDetection {
 
 /// Result of an image update; values that are not known are NaN.
 ///
-/// Set `size` to `sizeof(TautscopeReport)` first. A library with more members than the caller's fills those the caller has.
+/// Set `size` to `sizeof(TautscopeReport)` first. A smaller one than the library's is refused.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TautscopeReport {

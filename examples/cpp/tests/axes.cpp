@@ -128,6 +128,8 @@ int errors() {
     wrong += refuses([&] { axes.on_tip({0.1}, 0.0); }, "measurement.count");
     wrong += refuses([&] { axes.on_tip({0.1, 0.2}, 0.0, {1.0}); }, "covariance: got 1 numbers, expected 4");
     wrong += refuses([&] { axes.on_measurement({0.1, 0.2}, 0.0, small, fails); }, "of the model");
+    tautscope::Values command{tautscope::Numbers({0.3, 0.4})};
+    wrong += axes.try_step({0.1}, 0.1, command) != TAUTSCOPE_RESULT_SIZE || command[0] != 0.3 || command[1] != 0.4;
     const tautscope::Values state = axes.predicted_state();
     wrong += state.size() != axes.dofs() || !(state[0] >= -1 && state[0] <= 1);
     return wrong;

@@ -234,7 +234,8 @@ class HysteresisReduction:
         """First part of `on_frame`: a function that finds the markers, for any thread to call.
 
         The function does not use the loop, so `step` may be called meanwhile. Pass its result to
-        `on_detection` before preparing the next frame.
+        `on_detection` before preparing the next frame. The image must not change until then: pass a
+        copy of a buffer that the camera reuses.
 
         Raises:
             SignalError: The capture time is not finite.

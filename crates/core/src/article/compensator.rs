@@ -110,14 +110,6 @@ impl Compensator {
         })
     }
 
-    /// This compensator with other gains.
-    ///
-    /// # Errors
-    /// As [`Compensator::new`].
-    pub fn with_gain(self, free_gain: f64, gain_limit: f64) -> Result<Self, ConfigError> {
-        Self::new(free_gain, gain_limit)?.with_recovery(self.recovery)
-    }
-
     /// This compensator with the anchor's return to zero, as a share of the reference's travel.
     ///
     /// # Errors

@@ -41,8 +41,12 @@ impl AxisFilter {
         })
     }
 
-    /// The predicted tip for the next command.
+    /// The predicted tip for the next command; one that is not finite moves nothing.
     pub fn step(&mut self, command: f64) -> f64 {
+        if !command.is_finite() {
+            let [tip] = self.estimate.tip(&self.plays);
+            return tip;
+        }
         if self.estimate.origin[0].is_nan() {
             self.estimate.origin = [command];
         }

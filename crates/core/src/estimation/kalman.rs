@@ -10,19 +10,14 @@ use nalgebra::{DVectorView, SMatrix, SVector};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kalman<const D: usize> {
     prior_mean: SVector<f64, D>,
-    prior: PriorCovariance<D>,
-    /// Means (D,).
-    pub mean: SVector<f64, D>,
-    covariance: SMatrix<f64, D, D>,
-}
-
-/// A covariance diag(v) - t t' within each block of coefficients, and 0 between blocks: of independent coefficients of
-/// variances v, of each block a weighted sum is known as well.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct PriorCovariance<const D: usize> {
+    /// The prior's covariance is diag(v) - t t' within each block of coefficients, and 0 between blocks: of independent
+    /// coefficients of variances v, of each block a weighted sum is known as well.
     variance: SVector<f64, D>,
     tie: SVector<f64, D>,
     block: usize,
+    /// Means (D,).
+    pub mean: SVector<f64, D>,
+    covariance: SMatrix<f64, D, D>,
 }
 
 impl<const D: usize> Kalman<D> {
@@ -30,11 +25,9 @@ impl<const D: usize> Kalman<D> {
     pub fn new(mean: SVector<f64, D>, variance: SVector<f64, D>, block: usize) -> Self {
         Self {
             prior_mean: mean,
-            prior: PriorCovariance {
-                variance,
-                tie: SVector::zeros(),
-                block,
-            },
+            variance,
+            tie: SVector::zeros(),
+            block,
             mean,
             covariance: SMatrix::from_diagonal(&variance),
         }
@@ -42,11 +35,11 @@ impl<const D: usize> Kalman<D> {
 
     /// Makes the prior of row . x as certain as `std`, where `row` (D,) is of one block, of which no other sum is known yet.
     pub fn know_sum(&mut self, row: &SVector<f64, D>, std: f64) {
-        let cross = row.component_mul(&self.prior.variance);
+        let cross = row.component_mul(&self.variance);
         let total = row.dot(&cross);
         let known = 1.0 - (std * std / total).min(1.0);
         let tie = cross * libm::sqrt(known / total);
-        self.prior.tie += tie;
+        self.tie += tie;
         self.covariance.syger(-1.0, &tie, &tie, 1.0);
     }
 
@@ -112,12 +105,10 @@ impl<const D: usize> Kalman<D> {
             let below = column.iter_mut().zip(keep.as_slice()).skip(index);
             below.for_each(|(entry, keep)| *entry *= keep * by);
         }
-        let PriorCovariance {
-            variance,
-            tie,
-            block,
-        } = self.prior;
-        let noise = variance.zip_map(keep, |prior, keep| (1.0 - keep * keep) * prior);
+        let (tie, block) = (self.tie, self.block);
+        let noise = self
+            .variance
+            .zip_map(keep, |prior, keep| (1.0 - keep * keep) * prior);
         for (index, variance) in noise.iter().enumerate() {
             self.add_variance(index, *variance);
         }
@@ -153,17 +144,11 @@ impl<const D: usize> Kalman<D> {
         only: Option<&SVector<f64, D>>,
     ) {
         let noise = SMatrix::<f64, M, M>::identity() * variance;
-        let gain = |cross: &SMatrix<f64, D, M>| {
-            let factor = (rows.tr_mul(cross) + noise).cholesky()?;
-            Some(cross * factor.inverse())
-        };
-        let gain = match only {
-            None => gain(cross),
-            Some(only) => gain(&self.cross_of(only, rows)),
-        };
-        let Some(gain) = gain else {
+        let own = only.map_or(*cross, |only| self.cross_of(only, rows));
+        let Some(factor) = (rows.tr_mul(&own) + noise).cholesky() else {
             return;
         };
+        let gain = own * factor.inverse();
         let total = rows.tr_mul(cross) + noise;
         let innovation = value - rows.tr_mul(&self.mean);
         self.mean += gain * innovation;

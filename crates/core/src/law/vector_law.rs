@@ -12,6 +12,8 @@ use crate::model::slack::Slack;
 
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
+/// Length of a motion, in `width_limit`, below which it counts as rest: its square would underflow.
+const REST: f64 = 1e-100;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
 /// Speed of the tip over the predicted one, at most that of the command: while few plays slide, a tip that is a single play
@@ -180,23 +182,17 @@ impl<const N: usize> VectorLaw<N> {
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let (mut command, gain) = (self.command, self.settings.free_gain);
-        for group in 0..N {
+        let mut surplus = self.surplus;
+        for (group, surplus) in surplus.iter_mut().enumerate() {
             let members = self.transmission.friction().members(group);
             let own = only(members, moved);
-            if own.iter().all(|own| *own == 0.0) {
+            if self.norm(own) < REST {
                 continue;
             }
             let has_turned = dot([1.0; N], only(members, before), direction) < 0.0;
-            let surplus = self.growth
-                + self
-                    .surplus
-                    .get(group)
-                    .map_or(0.0, |last| if has_turned { 0.0 } else { *last });
-            let step = self.bounded_step(members, surplus, relative, own);
-            let faster = (self.norm(step) - self.norm(own)).max(0.0);
-            if let Some(last) = self.surplus.get_mut(group) {
-                *last = faster;
-            }
+            let most = self.growth + if has_turned { 0.0 } else { *surplus };
+            let step = self.bounded_step(members, most, relative, own);
+            *surplus = (self.norm(step) - self.norm(own)).max(0.0);
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
             let parts = step
@@ -217,6 +213,7 @@ impl<const N: usize> VectorLaw<N> {
                 }
             }
         }
+        self.surplus = surplus;
         command
     }
 
@@ -279,8 +276,7 @@ impl<const N: usize> VectorLaw<N> {
             let linear: f64 = row.iter().take(SHARED + OWN).sum();
             let constant = row.get(OFFSET).copied().unwrap_or(0.0);
             for _ in 0..SLIDES {
-                let (curved, _) = bent(row, *to, direction);
-                let tip = linear * *to - deflection + curved + constant;
+                let tip = linear * *to - deflection + bent(row, *to, direction) + constant;
                 *to += (reference - tip) / slack.gain;
             }
             *to = to.max(reference - 2.0).min(reference + 2.0);

@@ -11,12 +11,11 @@ use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{Observed, Sensor};
 use crate::r#loop::best::{Best, ERRORS};
-use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{BandProfile, BandsView, Image, Seen};
 use crate::r#loop::report::GeometryEstimate;
-use crate::r#loop::settings::Settings;
+use crate::r#loop::settings::LoopSettings;
 use crate::model::features::{FeatureModel, FeaturePrediction};
 
 /// Limits of the low-passed error of the predicted tip, in units.
@@ -54,7 +53,7 @@ impl Sensor<3, 4, ERRORS> for FeatureModel {
 }
 
 impl BandProfile for Best {
-    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
+    fn new(settings: &LoopSettings<3>, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
         let own = settings.estimation;
         let lasting = |std| GeometryPrior {
             std,
@@ -74,8 +73,8 @@ impl BandProfile for Best {
             rest,
             rest,
         ];
-        state_estimator(&settings.dofs())?;
-        Self::with_geometry(&settings.of_loop()?, limits, geometry, SLACK_CHANGED)
+        state_estimator(&settings.dofs)?;
+        Self::with_geometry(settings, limits, geometry, SLACK_CHANGED)
     }
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
@@ -127,13 +126,12 @@ impl BandProfile for Best {
             innovation,
             ..about
         };
-        let (is_partial, has_outlier) = completeness(used, image.features);
         let measurement = Measurement {
             state: estimate.state,
             observable: estimate.observable,
             distance: libm::sqrt(markers.distance_squared),
-            is_partial,
-            has_outlier,
+            is_partial: a != b,
+            has_outlier: used != found(image.features),
             evidence: linear,
         };
         let view = BandsView {

@@ -177,19 +177,17 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
             !updates_offsets,
         );
         if !updates_offsets {
-            return Updated::NOTHING;
+            return ([Triggers::default(); N], Flags::NONE);
         }
         self.rows = self.estimate.coefficients();
         self.slack = self.estimate.slack();
         let measured = measurement.state;
         let (time, predicted) = (past.time, past.predicted_state);
         let has_changed = self.prediction.update(time, predicted, measured);
-        Updated {
-            triggers: self.triggers(past),
-            raised: Flags::when(self.law.is_limited, Flag::WidthLimit)
-                .union(Flags::when(has_changed, Flag::SlackChanged))
-                .union(Flags::when(self.is_geometry_off(), Flag::GeometryOff)),
-        }
+        let raised = Flags::when(self.law.is_limited, Flag::WidthLimit)
+            .union(Flags::when(has_changed, Flag::SlackChanged))
+            .union(Flags::when(self.is_geometry_off(), Flag::GeometryOff));
+        (self.triggers(past), raised)
     }
 
     fn miss(&mut self, _: &Entry<N>) {

@@ -1,19 +1,20 @@
 //! The update of the loop by a measurement: checks of the monitors, state estimate, offset estimates.
 
 use crate::article::estimator::Triggers;
-use crate::article::state::{StateEstimate, found};
+use crate::article::state::StateEstimate;
 use crate::dof::zip_with;
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
 use crate::r#loop::any_loop::BandLoop;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
-use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen, Updated};
+use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{GeometryEstimate, Report, Status};
 use crate::r#loop::sight::Sight;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};
+use crate::supervision::reactions::{Reaction, Source};
 
 /// Result of an update by a measurement, of which the sensor has the view `V`.
 pub(super) struct Outcome<const N: usize, V> {
@@ -46,7 +47,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(sight, captured_at, sensor, past, &mut raised);
         let rate = self.monitors.check_rate(captured_at, sensor);
-        self.monitors.react_to_frame(raised.union(rate));
+        self.monitors.update(Source::Frame, raised.union(rate));
         outcome
     }
 
@@ -62,7 +63,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             status,
             past,
             seen: None,
-            triggers: Updated::NOTHING.triggers,
+            triggers: [Triggers::default(); N],
         };
         let is_repeated = self
             .last_used
@@ -87,12 +88,20 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             return unused(Status::NoMarkers, Some(past));
         }
         let Some((measurement, view)) = sight.measure(&self.profile, &past) else {
+            // The model sees nothing from where the tip is believed to be.
+            let is_missing = self.is_missing(past.travel, [false; N]);
+            let missed = if I::IS_WHOLE {
+                Flags::of(Flag::Lost)
+            } else {
+                Flags::when(is_missing, Flag::Unobservable)
+            };
+            *raised = self.monitors.enabled(missed);
             return unused(Status::Held, Some(past));
         };
         *raised = self.check_innovation(sight, &past, measurement.distance, &view);
         if !raised.is_empty() {
             // Bands that contradict the prediction for as long as a hold lasts are more credible than the prediction.
-            if self.monitors.is_fading() {
+            if self.monitors.supervision().reaction == Reaction::Fade {
                 self.profile.reset_prediction(&past);
             } else {
                 self.profile.miss(&past);
@@ -102,7 +111,10 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let is_missing = self.is_missing(past.travel, measurement.observable);
+        // With an outlier nothing but the offset is learnt.
+        let is_learnt = I::IS_WHOLE || !measurement.has_outlier;
+        let determined = measurement.observable.map(|own| own && is_learnt);
+        let is_missing = self.is_missing(past.travel, determined);
         let is_missed = [is_missing || I::IS_WHOLE, is_missing];
         let (status, triggers) = self.accept(&past, &measurement, is_missed, raised);
         Outcome {
@@ -172,34 +184,29 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let outlier = self
             .monitors
             .enabled(Flags::when(measurement.has_outlier, Flag::Innovation));
-        let updates_offsets = outlier.is_empty() && self.monitors.permits_updates();
+        let is_trusted = outlier.is_empty();
+        let updates_offsets =
+            is_trusted && self.monitors.supervision().reaction < Reaction::HoldEstimate;
         let mut motion = Flags::NONE;
-        if updates_offsets {
+        // Also while the offsets are held: a fade must not end the search for its cause.
+        if is_trusted {
             let play = self.play();
             motion = self.monitors.check_motion(
                 past.time,
                 past.reference,
-                measurement.observed_state(),
+                zip_with(measurement.state, measurement.observable, |value, known| {
+                    if known { value } else { f64::NAN }
+                }),
                 play,
             );
         }
-        let Updated {
-            triggers,
-            raised: conspicuous,
-        } = self.profile.update(past, measurement, updates_offsets);
-        *raised = motion.union(
-            self.monitors.enabled(
-                conspicuous
-                    .union(Flags::when(
-                        is_part_missed && status == Status::Partial,
-                        Flag::Merged,
-                    ))
-                    .union(Flags::when(
-                        is_dof_missed && status == Status::Held,
-                        Flag::Unobservable,
-                    )),
-            ),
-        );
+        let (triggers, conspicuous) = self.profile.update(past, measurement, updates_offsets);
+        let missed = match status {
+            Status::Held => Flags::when(is_dof_missed, Flag::Unobservable),
+            Status::Ok if !measurement.has_outlier => Flags::NONE,
+            _ => Flags::when(is_part_missed, Flag::Merged),
+        };
+        *raised = motion.union(self.monitors.enabled(conspicuous.union(missed)));
         (status, triggers)
     }
 }
@@ -307,10 +314,4 @@ impl<P: BandProfile> Sight<P, 3> for Bands<'_> {
         let exchanged = image.and_then(|image| profile.measure(&self.model, past, image));
         exchanged.is_some_and(|(other, view)| view.used == [true; 2] && fits(other.distance))
     }
-}
-
-/// Whether one of two markers was used, and whether one that was found was not.
-pub(super) fn completeness(used: [bool; 2], features: [f64; 4]) -> (bool, bool) {
-    let is_partial = matches!(used, [true, false] | [false, true]);
-    (is_partial, used != found(features))
 }

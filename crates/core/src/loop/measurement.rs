@@ -1,7 +1,7 @@
 //! A measurement of the tip, as profiles and sensors provide it.
 
 use crate::article::state::found;
-use crate::dof::{all_finite, zip_with};
+use crate::dof::all_finite;
 
 /// A measurement of the state, with what the update of a profile needs of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,14 +18,6 @@ pub struct Measurement<const N: usize, E> {
     pub has_outlier: bool,
     /// What the profile needs beside them.
     pub evidence: E,
-}
-
-impl<const N: usize, E> Measurement<N, E> {
-    /// The state of each DOF that was determined, NaN for the others [m or rad].
-    pub(crate) fn observed_state(&self) -> [f64; N] {
-        let observed = |value, is_observable| if is_observable { value } else { f64::NAN };
-        zip_with(self.state, self.observable, observed)
-    }
 }
 
 /// Whether the vectors from band A to band B of two sets of features (4,) in px differ in direction by more than

@@ -12,10 +12,9 @@ use crate::error::ConfigError;
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::state_prediction::{StatePrediction, step_deviation};
-use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen, Updated};
-use crate::r#loop::settings::Settings;
+use crate::r#loop::settings::LoopSettings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -56,8 +55,22 @@ pub trait StateEstimation<const N: usize>: Sized {
 pub struct StateFromImages(StateEstimator);
 
 impl StateEstimation<3> for StateFromImages {
-    fn named(predicted: PerDof<f64>, state: PerDof<f64>) -> PerDof<f64> {
-        turn(state, half_turn(predicted, state))
+    /// The same posture by another name, which images never tell apart:
+    ///
+    /// ```text
+    /// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
+    /// ```
+    ///
+    /// Wrong where the rotation is expected a quarter of a turn off.
+    fn named([_, predicted, _]: PerDof<f64>, state: PerDof<f64>) -> PerDof<f64> {
+        let [insertion, rotation, bending] = state;
+        let away = rotation - predicted;
+        if away.abs() > FRAC_PI_2 {
+            [insertion, rotation - PI.copysign(away), -bending]
+        } else {
+            // Minus zero plus zero is another number.
+            [insertion, rotation + 0.0, bending]
+        }
     }
 }
 
@@ -116,15 +129,6 @@ impl<const N: usize, E: StateEstimation<N>> Profile<N> for Paper<N, E> {
         self.axes.each_ref().map(|axis| axis.estimation.play())
     }
 
-    fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(&mut self, _: &History<S, N>, _: bool) {}
-
-    fn advance<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
-        &mut self,
-        _: &History<S, N>,
-        _: &Entry<N>,
-    ) {
-    }
-
     fn update(
         &mut self,
         past: &Entry<N>,
@@ -135,10 +139,9 @@ impl<const N: usize, E: StateEstimation<N>> Profile<N> for Paper<N, E> {
         let std = step_deviation(past, state, measurement.evidence);
         self.prediction.set(past, state, std, observable);
         if !updates_offsets {
-            return Updated::NOTHING;
+            return ([Triggers::default(); N], Flags::NONE);
         }
-        let (triggers, raised) = self.update_offsets(past.command, state, observable);
-        Updated { triggers, raised }
+        self.update_offsets(past.command, state, observable)
     }
 
     fn miss(&mut self, past: &Entry<N>) {
@@ -151,10 +154,9 @@ impl<const N: usize, E: StateEstimation<N>> Profile<N> for Paper<N, E> {
 }
 
 impl BandProfile for Paper {
-    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
-        let dofs = settings.dofs();
-        let estimation = StateFromImages(state_estimator(&dofs)?);
-        Self::with_estimation(&dofs, limits, estimation)
+    fn new(settings: &LoopSettings<3>, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
+        let estimation = StateFromImages(state_estimator(&settings.dofs)?);
+        Self::with_estimation(&settings.dofs, limits, estimation)
     }
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
@@ -169,7 +171,7 @@ impl BandProfile for Paper {
         past: &Entry,
         image: Image<'_>,
     ) -> Option<Seen<Self::Evidence>> {
-        let used = found(image.features);
+        let used @ [a, b] = found(image.features);
         let prior = self.prior(past);
         let start = if used == [true; 2] {
             past.predicted_state
@@ -180,14 +182,13 @@ impl BandProfile for Paper {
         let StateFromImages(estimator) = &self.estimation;
         let estimate = estimator.estimate(start, &prediction, image.features);
         let state_deviation = estimate.state_deviation(image.covariance.unwrap_or(&UNIT));
-        let (is_partial, has_outlier) = completeness(used, image.features);
         let (state, observable) = (estimate.state, estimate.observable);
         let measurement = Measurement {
             state,
             observable,
             distance: self.distance(past, &prior, state, state_deviation, observable),
-            is_partial,
-            has_outlier,
+            is_partial: a != b,
+            has_outlier: false,
             evidence: state_deviation,
         };
         let view = BandsView {
@@ -263,7 +264,7 @@ impl<const N: usize, E> Paper<N, E> {
         command: [f64; N],
         state: [f64; N],
         observed: [bool; N],
-    ) -> ([Triggers; N], Flags) {
+    ) -> Updated<N> {
         let (mut triggers, mut raised) = ([Triggers::default(); N], Flags::NONE);
         let axes = self
             .axes
@@ -349,29 +350,6 @@ impl ArticleAxis {
     }
 }
 
-/// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.
-///
-/// Wrong where the rotation is expected a quarter of a turn off.
-fn half_turn(expected: PerDof<f64>, state: PerDof<f64>) -> f64 {
-    let ([_, expected, _], [_, rotation, _]) = (expected, state);
-    let away = rotation - expected;
-    if away.abs() > FRAC_PI_2 {
-        -PI.copysign(away)
-    } else {
-        0.0
-    }
-}
-
-/// The same posture by another name, `half_turn` being pi, -pi or 0; images never tell them apart:
-///
-/// ```text
-/// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
-/// ```
-fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerDof<f64> {
-    let side = if half_turn.abs() > 0.0 { -1.0 } else { 1.0 };
-    [insertion, rotation + half_turn, side * bending]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -382,7 +360,7 @@ mod tests {
             let rotation = 0.1 + 0.35 * f64::from(turns);
             let state = [0.03, rotation, 0.9];
             let expected = [0.0, 0.2, 1.0];
-            let [insertion, named, bending] = turn(state, half_turn(expected, state));
+            let [insertion, named, bending] = StateFromImages::named(expected, state);
             assert!((named - 0.2).abs() <= FRAC_PI_2 + 1e-12, "{rotation}");
             let turns = (named - rotation) / PI;
             assert!((turns - turns.round()).abs() < 1e-12 && turns.abs() < 1.5);

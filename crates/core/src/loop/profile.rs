@@ -10,7 +10,7 @@ use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::report::{GeometryEstimate, SlackEstimate};
-use crate::r#loop::settings::Settings;
+use crate::r#loop::settings::LoopSettings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
@@ -33,25 +33,8 @@ impl Image<'_> {
     }
 }
 
-/// Result of an update with a measurement.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Updated<const N: usize> {
-    /// Which offsets were updated, and why.
-    pub triggers: [Triggers; N],
-    /// What was conspicuous.
-    pub raised: Flags,
-}
-
-impl<const N: usize> Updated<N> {
-    /// Nothing was updated.
-    pub const NOTHING: Self = Self {
-        triggers: [Triggers {
-            minus: None,
-            plus: None,
-        }; N],
-        raised: Flags::NONE,
-    };
-}
+/// Result of an update with a measurement: which offsets were updated and why, and what was conspicuous.
+pub type Updated<const N: usize> = ([Triggers; N], Flags);
 
 /// A profile of the loop with N DOFs, `Paper` or `Best`: compensation law, offset estimates and state estimation. Only this crate
 /// has profiles.
@@ -88,16 +71,18 @@ pub trait Profile<const N: usize = 3>: Law<N> + Sized {
     /// Keeps up with the history at the end of a control tick.
     fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
         &mut self,
-        history: &History<S, N>,
-        has_clock_gone_back: bool,
-    );
+        _history: &History<S, N>,
+        _has_clock_gone_back: bool,
+    ) {
+    }
 
     /// Propagates the state prediction to the time of a measurement.
     fn advance<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
         &mut self,
-        history: &History<S, N>,
-        past: &Entry<N>,
-    );
+        _history: &History<S, N>,
+        _past: &Entry<N>,
+    ) {
+    }
 
     /// Updates the state prediction with an accepted measurement, and with `updates_offsets` the offsets.
     fn update(
@@ -136,7 +121,7 @@ pub trait BandProfile: Profile {
     ///
     /// # Errors
     /// A setting is out of range.
-    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError>;
+    fn new(settings: &LoopSettings<3>, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError>;
 
     /// The state prediction at a tick of the history.
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(

@@ -35,7 +35,7 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
         let of_loop = settings.of_loop()?;
-        let make = |limits| P::new(settings, limits);
+        let make = |limits| P::new(&of_loop, limits);
         Self::with_profile(&of_loop, make, settings.feature_model()?, storage)
     }
 }

@@ -1,6 +1,6 @@
 //! All settings of the loop, a table per block.
 
-use crate::dof::{Friction, PerDof};
+use crate::dof::Friction;
 use crate::error::ConfigError;
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::history_entries;
@@ -74,26 +74,14 @@ impl Settings {
     /// The diameter is not a finite number above 0.
     pub(crate) fn of_loop(&self) -> Result<LoopSettings<3>, ConfigError> {
         Ok(LoopSettings {
-            dofs: self.dofs(),
-            friction: self.friction()?,
+            dofs: [self.insertion, self.rotation, self.bending],
+            // Insertion and rotation share the friction of the shaft, whose surface a rotation moves by the radius.
+            friction: Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])?,
             control: self.control,
             safety: self.safety,
             law: self.law,
             estimation: self.estimation,
         })
-    }
-
-    /// The three DOFs in their order.
-    pub(crate) const fn dofs(&self) -> PerDof<DofSettings> {
-        [self.insertion, self.rotation, self.bending]
-    }
-
-    /// Insertion and rotation share the friction of the shaft in its channel, whose surface a rotation moves by the radius.
-    ///
-    /// # Errors
-    /// The diameter is not a finite number above 0.
-    pub(crate) fn friction(&self) -> Result<Friction<3>, ConfigError> {
-        Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])
     }
 
     /// Entries of the history that a loop with these settings needs.

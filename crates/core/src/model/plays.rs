@@ -326,23 +326,15 @@ fn follow<const K: usize>(outputs: &mut [f64; K], radii: &[f64; K], to: f64) {
     }
 }
 
-/// Contribution of the bent plays of a DOF whose own plays slide along `direction` to a command `to`, and its slope.
-pub fn bent(row: &Row, to: f64, direction: f64) -> (f64, f64) {
+/// Contribution of the bent plays of a DOF whose own plays slide along `direction` to a command `to`.
+pub fn bent(row: &Row, to: f64, direction: f64) -> f64 {
     let radii = OWN_RADII
         .iter()
         .step_by(2)
         .flat_map(|radius| KNOTS.map(|knot| radius * sign(direction) + knot));
-    row.iter()
-        .skip(SHARED + OWN)
-        .zip(radii)
-        .fold((0.0, 0.0), |(sum, slope), (w, from)| {
-            let above = to - from;
-            if above > 0.0 {
-                (sum + w * above, slope + w)
-            } else {
-                (sum, slope)
-            }
-        })
+    let plays = row.iter().skip(SHARED + OWN).zip(radii);
+    let above = plays.filter(|(_, from)| to > *from);
+    above.fold(0.0, |sum, (w, from)| sum + w * (to - from))
 }
 
 /// Row whose product with the coefficients is the gain of a DOF: all plays, and of the bent ones their mean slope from -1 to 1.

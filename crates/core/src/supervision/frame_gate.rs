@@ -67,7 +67,9 @@ impl<const N: usize> FrameGate<N> {
     }
 
     /// Check at a control tick that frames arrive. None is missing before the first.
-    pub fn check_gap(&self, time: f64) -> Flags {
+    pub fn check_gap(&mut self, time: f64) -> Flags {
+        // A clock that was set back restarts the gap.
+        self.arrived_at = self.arrived_at.map(|last| last.min(time));
         let gap = self.arrived_at.map_or(0.0, |last| time - last);
         Flags::when(gap > self.settings.frame_gap, Flag::Dropped)
     }

@@ -112,9 +112,7 @@ impl<const N: usize> Monitors<N> {
             source: Source::Tick,
             time,
             travel: 0.0,
-            raised: gated
-                .raised
-                .union(self.check_gap(time).difference(self.off)),
+            raised: gated.raised.union(self.check_gap(time)),
             severe: gated.severe,
         };
         for (increment, unit) in gated.increments.iter().zip(self.unit) {
@@ -228,9 +226,10 @@ impl<const N: usize> Monitors<N> {
         dofs.any(|(travel, unit)| *travel > UNSEEN * unit)
     }
 
-    fn check_gap(&self, time: f64) -> Flags {
-        let gates = self.frames.iter();
-        gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)))
+    fn check_gap(&mut self, time: f64) -> Flags {
+        let gates = self.frames.iter_mut();
+        let found = gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)));
+        self.enabled(found)
     }
 
     /// The flags of a set whose detectors are not switched off.
@@ -257,27 +256,13 @@ impl<const N: usize> Monitors<N> {
         self.enabled(flags)
     }
 
-    /// Whether the compensation fades out.
-    pub(crate) fn is_fading(&self) -> bool {
-        self.supervisor.now().reaction == Reaction::Fade
-    }
-
-    /// Whether images may update the offsets.
-    pub(crate) fn permits_updates(&self) -> bool {
-        self.supervisor.now().reaction < Reaction::HoldEstimate
-    }
-
-    /// React to the flags of a frame.
-    pub(crate) fn react_to_frame(&mut self, raised: Flags) {
-        self.update(Source::Frame, raised);
-    }
-
     /// Raise a flag of the rig.
     pub fn raise(&mut self, flag: Flag) {
         self.update(Source::Rig, self.enabled(Flags::of(flag)));
     }
 
-    fn update(&mut self, source: Source, raised: Flags) {
+    /// React to flags between two control ticks.
+    pub(crate) fn update(&mut self, source: Source, raised: Flags) {
         self.supervisor.update(&Event {
             source,
             time: self.time,

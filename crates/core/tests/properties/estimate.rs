@@ -233,13 +233,14 @@ proptest! {
 }
 
 #[test]
-fn a_tip_that_is_not_finite_updates_nothing() {
+fn a_tip_or_command_that_is_not_finite_changes_nothing() {
     let mut filter = AxisFilter::new(settings(&safety()).estimation, EXPECTED, STD).unwrap();
     filter.update(1.0);
     filter.step(ORIGIN);
     let before = filter.clone();
-    for tip in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        filter.update(tip);
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        filter.update(wrong);
+        filter.step(wrong);
         assert_eq!(filter, before);
     }
 }

@@ -142,3 +142,21 @@ fn a_tip_that_overtakes_the_reference_is_reported_unless_its_detector_is_off() {
         );
     }
 }
+
+/// By a gain above that of the instrument, which no offset explains.
+#[test]
+fn compensation_fades_for_as_long_as_a_tip_overtakes_the_reference() {
+    let play = |unit: f64| Play::new(-6.0 * unit, 6.0 * unit).unwrap();
+    let mut strokes = Strokes::new(article(play));
+    let mut least = 1.0_f64;
+    for _ in 0..8000 {
+        strokes.go(0.01);
+        if strokes.tick.is_multiple_of(8) {
+            let mut tip = strokes.command;
+            tip[0] += 0.7 * (tip[0] - START[0]);
+            strokes.image_update(tip);
+        }
+        least = least.min(strokes.reduction.supervision().lead);
+    }
+    assert!(least < 0.6, "{least}");
+}

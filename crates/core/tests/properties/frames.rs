@@ -92,6 +92,12 @@ fn a_frame_is_late_after_its_age_and_dropped_after_the_gap() {
         );
         assert_eq!(gate.check_gap(now), Flags::NONE);
     }
+    // A clock that is set back does not hide that frames are missing.
+    let mut gate = new_gate();
+    arrive(&mut gate, 1000.0, 1000.0, true);
+    assert_eq!(gate.check_gap(5.0), Flags::NONE);
+    let missed = gate.check_gap(5.0 + 1.001 * frame_gap);
+    assert_eq!(missed, Flags::of(Flag::Dropped));
     let mut gate = new_gate();
     assert_eq!(arrive(&mut gate, 0.0, frame_age, true), Flags::NONE);
     let mut gate = new_gate();

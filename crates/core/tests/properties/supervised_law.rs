@@ -9,15 +9,13 @@ use super::{close, path};
 /// Of 5 it is 1 + 4 of that share; all else stays as it is.
 #[test]
 fn gain_share_scales_the_gain_beyond_one() {
-    let whole = Compensator::new(5.0, 6.0)
-        .and_then(|law| law.with_recovery(0.1))
-        .unwrap();
+    let of_gain = |gain| {
+        let law = Compensator::new(gain, 6.0).unwrap();
+        law.with_recovery(0.1).unwrap()
+    };
+    let whole = of_gain(5.0);
     for (share, gain) in [(1.0, 5.0), (0.5, 3.0), (0.25, 2.0), (0.0, 1.0)] {
-        assert_eq!(
-            whole.with_share(share),
-            whole.with_gain(gain, 6.0).unwrap(),
-            "{share}"
-        );
+        assert_eq!(whole.with_share(share), of_gain(gain), "{share}");
     }
     let (mut state, none) = (
         CompensatorState::new(Play::new(-1.0, 1.0).unwrap()),

@@ -7,7 +7,7 @@ use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;
 use crate::supervision::settings::SafetySettings;
 
-use super::support::loops::{article, article_with};
+use super::support::loops::{article, article_with, best};
 use super::support::{PERIOD, UNITS, safety};
 
 /// While nothing is wrong, what the loop commands is what the law does by itself.
@@ -99,5 +99,23 @@ fn a_flag_of_the_rig_counts_unless_it_is_off() {
             Flags::of(Flag::FollowingError).difference(off)
         );
         assert_eq!(supervision.reaction == Reaction::None, !off.is_empty());
+    }
+}
+
+/// The square of such a motion is 0: an input behind a low-pass that settles at 0 ends with these.
+#[test]
+fn a_motion_too_small_to_square_is_rest() {
+    for exponent in [-100, -150, -162, -163, -200, -300, -307] {
+        for dof in 0..3 {
+            let mut reduction = best();
+            reduction.step([0.0; 3], None, 0.0);
+            for tick in 1..100_u32 {
+                let mut reference = [0.0; 3];
+                reference[dof] = f64::from(tick % 3) * 10.0_f64.powi(exponent);
+                let command = reduction.step(reference, None, f64::from(tick) * PERIOD);
+                assert!(command[dof].abs() < 1e-90, "{command:?} at 1e{exponent}");
+            }
+            assert_eq!(reduction.supervision().reaction, Reaction::None);
+        }
     }
 }
