@@ -8,7 +8,7 @@ from pathlib import Path
 from hysteresis import loop_figures as shared
 from hysteresis.goals import LATENCIES
 from hysteresis.loop_figures import COLOURS, Finished
-from hysteresis.measures import fold_reduction, uncompensated_width
+from hysteresis.measures import uncompensated_width
 from hysteresis.scenarios import CHANGING_PERIODS, REST_FOR, STRAIGHT
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
@@ -98,7 +98,7 @@ def delays(finished: Finished) -> Figure:
     for name, runs in finished.every():
         found = {key: evaluate(runs["free"], runs[key]) for key in places}
         for dof, axes in zip(Dof, panels, strict=True):
-            share = [100 * fold_reduction(found[key][dof].reduction) for key in places]
+            share = [100 * found[key][dof].reduction for key in places]
             axes.plot(list(places.values()), share, "o-", color=COLOURS[name], markersize=2.5)
     for dof, axes in zip(Dof, panels, strict=True):
         axes.set_title(dof.label)
@@ -120,7 +120,7 @@ def disturbed(finished: Finished) -> Figure:
             for dof, result in evaluate(runs["free"], runs[name]).items():
                 place = row + 0.2 * (dof - 1)
                 axes.plot(
-                    100 * fold_reduction(result.reduction),
+                    100 * result.reduction,
                     place,
                     "o",
                     color=DOF_COLOURS[dof],

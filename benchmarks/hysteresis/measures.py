@@ -12,11 +12,6 @@ from tautscope.report import metrics
 from tautscope.runs.recording import Recording
 
 
-def fold_reduction(reduction: float) -> float:
-    """Return 1 - |1 - reduction|: a loop in the opposite direction counts as one of that width."""
-    return 1 - abs(1 - reduction)
-
-
 def segment_of(run: Recording, dof: Dof) -> Segment:
     """Return the segment in which a DOF moves."""
     (segment,) = (each for each in run.segments if each.dof is dof)

@@ -94,8 +94,8 @@ def alone(recordings: Recordings) -> Found:
     for dof, result in evaluate(free, run).items():
         segment = measures.segment_of(run, dof)
         found += [
-            ("reduction of mean width", dof, measures.fold_reduction(result.reduction)),
-            ("reduction of max width", dof, measures.fold_reduction(result.reduction_max)),
+            ("reduction of mean width", dof, result.reduction),
+            ("reduction of max width", dof, result.reduction_max),
             ("actuator gain", dof, result.actuator_gain),
             ("tip overspeed", dof, result.tip_overspeed),
             ("start", dof, result.start_periods),
@@ -121,7 +121,7 @@ def together(recordings: Recordings) -> Found:
     found: Found = []
     for dof, result in evaluate(recordings["free"], recordings["run"]).items():
         found += [
-            ("three DOFs at once: reduction", dof, measures.fold_reduction(result.reduction)),
+            ("three DOFs at once: reduction", dof, result.reduction),
             ("three DOFs at once: tracking error", dof, result.tracking_rms),
             ("three DOFs at once: state error", dof, result.state_rms),
             ("three DOFs at once: frames used", dof, result.frames_used),
@@ -208,10 +208,7 @@ def changes(recordings: Recordings) -> Found:
                 (
                     f"{name}: change of reduction",
                     dof,
-                    abs(
-                        measures.fold_reduction(after.reduction)
-                        - measures.fold_reduction(before[dof].reduction)
-                    ),
+                    abs(after.reduction - before[dof].reduction),
                 )
                 for dof, after in evaluate(free, recording).items()
             ]

@@ -156,6 +156,20 @@ def test_a_frozen_tip_is_left_out(seed: int) -> None:
     assert "(lines 1203 to 1601)" in verdict.text
 
 
+def test_of_repeated_values_only_those_that_the_model_contradicts_are_left_out() -> None:
+    """A tip without noise, which repeats its value in every gap, and is frozen once."""
+    truth = simulate("play", 1)
+    half = truth.width / abs(truth.gain) / 2
+    tip = play(truth.record.command, -half, half)
+    first = 1200 + int(np.flatnonzero(np.diff(tip[1200:]))[0]) + 1
+    tip[first : first + 300] = tip[first]
+    verdict = judge(replace(truth.record, measured=tip))
+    left_out = np.flatnonzero(np.isnan(verdict.record.measured))
+    np.testing.assert_array_equal(left_out, np.arange(first + 1, first + 300))
+    assert f"{len(left_out)} samples left out" in verdict.text
+    assert verdict.found.width.value == pytest.approx(2 * half, rel=1e-3)
+
+
 def test_a_frozen_rest_of_the_record_gives_no_confidence() -> None:
     truth = simulate("play", 2)
     tip = truth.record.measured.copy()

@@ -102,3 +102,16 @@ def test_a_lag_is_not_slack() -> None:
             state += share * (value - state)
             tip.append(state)
         assert not identify(record.clock, record.command, np.array(tip)).is_identified, seed
+
+
+def test_gain_offset_and_drift_are_the_prediction_at_any_sampling() -> None:
+    """m = g P + b + drift, with five times as many samples in the second half of a drift."""
+    time = np.concatenate([np.arange(0, 40, 0.1), np.arange(40, 80, 0.02)])
+    command = 10 * np.sin(2 * np.pi * time / 4)
+    noise = np.random.default_rng(1).normal(0, 0.05, len(time))
+    result = identify(time, command, 0.8 * play(command, -1, 1) + 3 + 0.1 * time + noise)
+    delayed = np.interp(time - result.delay.value, time, command)
+    plays = [play(delayed, -r, r, start=delayed[0]) for r in result.half_widths]
+    path = result.gain * np.mean(plays, axis=0) + result.offset + result.drift
+    np.testing.assert_allclose(path[200:], result.predicted[200:], atol=0.02)
+    assert result.drift.mean() == pytest.approx(0, abs=1e-9)

@@ -221,6 +221,13 @@ def test_parameters_of_bouc_wen_are_recovered() -> None:
         assert getattr(found, name) == pytest.approx(getattr(BOUC_WEN, name), rel=0.02), name
 
 
+def test_bouc_wen_keeps_the_turns_between_sparse_tips_of_a_long_record() -> None:
+    command = two_sines(12_000)
+    truth = BOUC_WEN.predict(command)
+    sparse = np.where(np.arange(len(command)) % 150 == 7, truth, np.nan)
+    assert rms(bouc_wen.fit(command, sparse).predict(command) - truth) < 0.02
+
+
 def test_bouc_wen_predicts_the_second_half() -> None:
     command = two_sines()
     truth = BOUC_WEN.predict(command)

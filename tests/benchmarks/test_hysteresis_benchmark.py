@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from common.doc_pages import insert
 from hysteresis import ablation, tables
-from hysteresis.measures import fold_reduction
 from hysteresis.scenarios import SCENARIOS
 from hysteresis.simulation import Sines, uncompensated
 from tautscope.config import load_config
@@ -41,11 +40,6 @@ def test_a_seed_without_a_value_is_the_worst() -> None:
     assert none["median"] is None
     assert not none["holds"]
     json.loads(tables.to_json([lost, none]))
-
-
-def test_a_loop_in_the_opposite_direction_is_no_gain() -> None:
-    assert fold_reduction(1.84) == pytest.approx(0.16)
-    assert fold_reduction(0.8) == pytest.approx(0.8)
 
 
 def test_overspeed_is_compared_seed_by_seed() -> None:

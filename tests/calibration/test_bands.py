@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from tautscope.calibration.bands import motion, result
 from tautscope.calibration.bands.labels import (
     BACKGROUND,
     BAND_A,
@@ -105,6 +106,34 @@ def test_a_sweep_without_an_answer_is_refused(change: str, named: str) -> None:
         ]
     with pytest.raises(CalibrationError, match=named):
         find_moving_bands(images, TIMES, positions)
+
+
+def test_few_random_positions_do_not_follow_three_motors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of white noise, no more than 1 in 50 looks like motion of the motors."""
+    count = motion.LEAST_IMAGES
+    times = np.arange(count) * motion.DURATION / count
+    phases = 2 * np.pi * times[:, None] / motion.DURATION * [1, 1, 2] + [0, 1, 0]
+    regressors = motion._regressors(times, np.sin(phases))
+    random, followed = np.random.default_rng(5), 0
+    monkeypatch.setattr(motion, "two_bands", lambda *_: ())
+    monkeypatch.setattr(motion, "_centre", lambda _: random.normal(0, 10, 2))
+    for _ in range(200):
+        found = motion._evaluate(np.zeros(count), (0, 0, 0), 0, regressors)
+        followed += found.following > motion.LEAST_FOLLOWING
+    assert followed <= 4
+
+
+def test_no_more_pixels_are_used_than_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    images, _ = sweep()
+    monkeypatch.setattr(motion, "_MOST_PIXELS", 10_000)
+    own, tissue = motion._split(images)
+    assert 5000 < len(own) <= 10_000
+    assert 25_000 < len(tissue) <= 50_000
+    image, bands = scene(30, 0)
+    each = labelled(image, bands)
+    most = len(each.pixels(BAND_A)) - 1
+    monkeypatch.setattr(result, "_MOST_PIXELS", most)
+    assert len(result._of([each], BAND_A)) <= most
 
 
 def test_malformed_input_is_refused() -> None:

@@ -144,11 +144,13 @@ def test_files_of_other_programs_are_named(tmp_path: Path, named: str, text: str
         (ROS, "a: [", "camera_info"),
         (ROS, "", "image_width"),
         ("image_width: 640", "image_width: x", "image_width"),
+        ("image_width: 640", "image_width: 0.5", "width: got 0.5, expected a number, at least 1"),
         ("data: [515.34626,", "data: [", "camera_matrix"),
         ("515.34626,   0.     ,", "515.34626,   1.     ,", "no skew"),
         ("plumb_bob", "double_sphere", "plumb_bob, rational_polynomial, equidistant"),
         ("-0.02, 1e-3,", "", "4 or 5 numbers"),
-        ("-0.02", "nan", "finite"),
+        ("-0.02", ".nan", "data: got nan, expected a list of finite numbers"),
+        ("-0.02", "x", "data: got 'x'"),
     ],
 )
 def test_a_bad_file_is_named(tmp_path: Path, old: str, new: str, named: str) -> None:

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from play_model import play
 from tautscope.calibration.delay import estimate_delay
+from tautscope.calibration.delay_probes import Signal
 from tautscope.calibration.tip_states import tip_states
 from tautscope.config import load_config
 from tautscope.errors import SignalError
@@ -145,3 +146,18 @@ def test_signals_are_checked() -> None:
         estimate_delay(times, positions[1:], times, positions)
     with pytest.raises(SignalError, match="finite positions"):
         estimate_delay(times, positions + np.nan, times, positions)
+
+
+def test_no_more_positions_are_used_than_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    times, positions = motors(None)
+    stamps, tips = images(times, positions, 0.1, 0.0, seed=1)
+    used: list[int] = []
+
+    def signal(times: Floats, *others: object) -> Signal:
+        used.append(len(times))
+        return Signal(times, *others)
+
+    monkeypatch.setattr("tautscope.calibration.delay.Signal", signal)
+    monkeypatch.setattr("tautscope.calibration.delay.MOST_POSITIONS", len(times) * 2 // 3)
+    assert estimate_delay(times, positions, stamps, tips).is_known
+    assert max(used) <= len(times) * 2 // 3

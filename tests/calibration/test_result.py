@@ -45,3 +45,11 @@ def test_changes_are_values_and_their_record() -> None:
     assert record.serial_numbers == {"camera": "A1"}
     assert record.std == {"camera.fx": 0.012, "camera.distortion[0]": 0.05}
     assert record.residual == 0.12
+
+
+def test_a_value_that_is_not_determined_is_recorded_without_a_deviation() -> None:
+    stds = {"camera.fx": float("inf"), "camera.fy": 0.1}
+    result = CalibrationResult("camera", {"camera.fx": 400.123456, "camera.fy": 400.0}, stds)
+    config = load_config().replace(**result.changes())
+    assert config.calibration.camera is not None
+    assert config.calibration.camera.std == {"camera.fy": 0.1}

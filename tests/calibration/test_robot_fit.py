@@ -1,6 +1,7 @@
 """Calibration of any robot: known parameters are found, and what is not determined is refused."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,7 +128,7 @@ def test_the_kinematics_of_a_catheter_in_the_frame_of_a_tracker() -> None:
 
 
 def test_what_a_sweep_does_not_determine_is_named() -> None:
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(1)
 
     def measure(q: np.ndarray, time: float) -> Pose:
         return Pose(catheter(q, rng)[0], time)
@@ -137,7 +138,7 @@ def test_what_a_sweep_does_not_determine_is_named() -> None:
             return super().tip() * [1.0, 0.0]
 
     robot = Still(measure, [1.0, 1.0], [0.0, 0.0], [0.3, 0.3])
-    run = record(robot, CATHETER, 13.0)
+    run = record(robot, CATHETER, 14.0)
     found = fit(run, CATHETER)
     assert "dof.bend_y.gain" in found.undetermined
     with pytest.raises(FieldError, match=r"--keep: got 'kinematics.sensor_rotation'"):
@@ -173,3 +174,35 @@ class Line:
 
     def points(self, q: np.ndarray) -> np.ndarray:
         return np.array([[100.0 * q[0] + 300.0, 200.0]])
+
+
+def test_two_sensors_whose_measurements_alternate_are_both_used() -> None:
+    rng = np.random.default_rng(0)
+
+    class WithTwo(Robot):
+        def step(self, command: ArrayLike) -> Sample:
+            sample = super().step(command)
+            if not sample.measurements:
+                return sample
+            second = Tip(self.tip() + rng.normal(0, 0.01, 1), sample.time + 0.15, sensor=1)
+            return replace(sample, measurement=(*sample.measurements, second))
+
+    config = axes(1, width_limit=1.0).replace(**{"control.period": PERIOD})
+    config = config.replace(dof=[{"name": "a", "width_limit": 1.0, "range": (-2.0, 2.0)}])
+    robot = WithTwo(lambda q, t: Tip(q + rng.normal(0, 0.01, 1), t), [0.9], [0.1], [0.3], 0.08)
+    found = fit(record(robot, config, 22.0), config)
+    assert not found.undetermined
+    check(found, {f"measurement.delays[{k}]": (0.08, 0.15)[k] + PERIOD for k in range(2)})
+
+
+@pytest.mark.parametrize("period", [5.0, 9.0, 20.0, 100.0])
+def test_the_sweep_starts_at_rest_and_stays_within_half_of_the_speed(period: float) -> None:
+    """By limits that would make a sine of amplitude 1.6 so long; shorter ones are made longer."""
+    speed = 2 * 1.6 * 2 * np.pi / period
+    dof = {"name": "a", "width_limit": 1.0, "range": (-2.0, 2.0), "speed": speed}
+    motion = sweep_motion(axes(1, width_limit=1.0).replace(dof=[dof]))
+    times = np.arange(0.0, 60.0, 1e-3)
+    speeds = np.abs(np.diff([motion(time)[0] for time in times])) / 1e-3
+    assert speeds[0] < 1e-3 * speed
+    assert speeds.max() <= speed / 2 * (1 + 1e-9)
+    assert speeds.max() > 0.49 * min(speed, 2 * 1.6 * 2 * np.pi / 9.0)

@@ -167,3 +167,13 @@ def test_a_file_with_several_episodes_is_refused(
     folder = write(tmp_path / "set", "v3.0", 2, 60)
     text = failed(capsys, "analyze", str(folder / "data/chunk-000/file-000.parquet"))
     assert "got '2 episodes', expected one: give the data set's folder" in text
+
+
+def test_a_reason_counts_once_whatever_its_numbers() -> None:
+    between = ("0 and 14.2", "1.3 and 14.2", "-1.3e-05 and 2", "3 and 1e+08")
+    rows = [
+        {"episode": k, "identified": False, "aligned": False, "missing": f"it is between {each}"}
+        for k, each in enumerate(between)
+    ]
+    (reason,) = of_episodes.summarize(rows)["reasons"]
+    assert reason["count"] == len(between)

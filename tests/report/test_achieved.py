@@ -12,20 +12,28 @@ PERIOD = 0.05
 FAR = 100.0
 
 
-def run(achieved: Achieved, start: float, errors: list[float], share: float) -> None:
-    """A tip that is off by each of these errors, and twice that in the second DOF, for 20 s."""
+def run(
+    achieved: Achieved,
+    start: float,
+    errors: list[float],
+    share: float,
+    *,
+    is_measured: bool = False,
+) -> None:
+    """A tip that is off by each of these errors, and twice that in the second DOF, for 20 s.
+
+    It is the true one, or measured without noise.
+    """
     loop = tautscope.HysteresisReduction(CONFIG)
     reference = np.zeros(2)
     for number, error in enumerate(np.repeat(errors, round(20 / PERIOD))):
         now = start + number * PERIOD
         tip = reference + np.array([error, 2 * error])
         loop.step(reference, now)
-        achieved.add_update(now, tip_at(now), loop.on_sample(tip_at(now)))
-        achieved.add_tick(Sample(now, reference, true_state=tip), reference, reference, share)
-
-
-def tip_at(now: float) -> Tip:
-    return Tip(np.zeros(2), now)
+        measured = Tip(tip if is_measured else np.zeros(2), now)
+        achieved.add_update(now, measured, loop.on_sample(measured))
+        sample = Sample(now, reference, true_state=None if is_measured else tip)
+        achieved.add_tick(sample, reference, reference, share)
 
 
 def test_it_is_the_error_with_and_without_compensation_that_is_told() -> None:
@@ -39,6 +47,16 @@ def test_it_is_the_error_with_and_without_compensation_that_is_told() -> None:
     assert second.compensated_rms == pytest.approx(0.1)
     text = achieved_text(achieved.results())
     assert text.startswith("Tip less reference, RMS: axis_1 0.05 rad, 0.3 without compensation,")
+
+
+def test_updates_count_for_the_share_of_their_time() -> None:
+    achieved = Achieved(CONFIG)
+    for start, error, share in ((0.0, 0.3, 0.0), (100.0, 0.4, 0.5), (200.0, 0.05, 1.0)):
+        run(achieved, start, [error, error, error], share, is_measured=True)
+    first, second = achieved.results().values()
+    for result, factor in ((first, 1), (second, 2)):
+        assert result.uncompensated_rms == pytest.approx(0.3 * factor, rel=0.05)
+        assert result.compensated_rms == pytest.approx(0.05 * factor, rel=0.05)
 
 
 def test_only_the_last_minutes_count() -> None:

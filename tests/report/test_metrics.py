@@ -110,6 +110,7 @@ def test_signals_of_different_length_are_an_error() -> None:
 def test_reduction_is_the_share_removed() -> None:
     assert metrics.reduction(10.0, 2.5) == pytest.approx(0.75)
     assert math.isnan(metrics.reduction(0.0, 1.0))
+    assert metrics.reduction(10.0, -9.0) == metrics.reduction(10.0, 9.0)
     loop = metrics.loop_width(*settled_loop(1.0, -0.2, 0.2))
     assert metrics.reduction(loop, loop) == 0
 
@@ -187,6 +188,7 @@ def test_overshoot_without_motion_or_of_unknown_values() -> None:
     assert math.isnan(metrics.overshoot([1.0, 1.0], [0.0, 1.0]))
     assert math.isnan(metrics.overshoot([], []))
     assert math.isnan(metrics.overshoot([0.0, 1.0, 2.0], [0.0, np.nan, 2.0]))
+    assert math.isnan(metrics.overshoot([0.0, 1.0, 2.0, 1.0, 0.0], [0.0, np.nan, 2.0, 1.0, 0.0]))
     # A rest inside a stroke does not end it.
     assert metrics.overshoot([0, 1, 1, 2], [0, 1, 1.5, 2]) == pytest.approx(0.5)
 
@@ -236,5 +238,7 @@ def test_creep_is_the_travel_of_the_tip_while_every_reference_rests() -> None:
     tip = [0.0, 1.0, 1.5, 7.0, 6.5, 7.5]
     assert metrics.creep(references, tip) == pytest.approx(0.5 + 0.5 + 1.0)
     assert np.isnan(metrics.creep(references[:1], tip[:1]))
+    unknown = [0.0, 1.0, np.nan, 7.0, np.nan, 7.5]
+    assert np.isnan(metrics.creep(references, unknown))
     with pytest.raises(SignalError):
         metrics.creep(references, tip[:-1])

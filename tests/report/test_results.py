@@ -103,3 +103,11 @@ def test_medians_and_worst_values_skip_unknown_figures() -> None:
     assert combine(results, "worst")[Dof.BENDING].reduction == 1.0
     assert combine(results, "worst")[Dof.BENDING].state_rms == 5.0
     assert np.isnan(combine([result(np.nan)], "median")[Dof.BENDING].state_rms)
+
+
+def test_the_worst_width_is_the_farthest_from_none() -> None:
+    results = [
+        {Dof.BENDING: DofResult(*[width] * len(DofResult.__dataclass_fields__))}
+        for width in (0.1, -3.0, 2.0)
+    ]
+    assert combine(results, "worst")[Dof.BENDING].compensated == -3.0

@@ -114,6 +114,26 @@ def test_motors_have_units(tmp_path: Path) -> None:
         np.testing.assert_allclose(positions, expected)
 
 
+@pytest.mark.parametrize(
+    ("title", "per_second", "start"),
+    [
+        ("time [ns]", 1e9, 5e12),  # since the computer started
+        ("time [ns]", 1e9, 1.7e18),
+        ("time [us]", 1e6, 2e11),
+        ("time", 1e3, 1.7e12),  # since 1970, by its size
+        ("time", 1.0, 1.7e9),
+    ],
+)
+def test_a_time_has_the_unit_of_its_title(
+    title: str, per_second: float, start: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "record.csv"
+    rows = [f"{start + per_second * k / 50:.3f},{k % 7},{k % 5}" for k in range(50)]
+    file.write_text("\n".join([f"{title},motor,tip", *rows]))
+    found = read_record(file, "motor", "tip", "time")
+    np.testing.assert_allclose(np.diff(found.time), 0.02, atol=1e-3)
+
+
 def test_implausible_and_unknown_units_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "motors.csv"
     largest = np.array([0.12, 6.0, 6.0])

@@ -27,7 +27,8 @@ LONGEST_INTERVAL = 0.1
 LEAST_REDUCTION = 0.1
 """Of the RMS error, from which on the compensator helps."""
 FITTED = 16_000
-"""Most measured tips that the plays of the simulation are fitted to."""
+"""Of a longer record, the plays of the simulation are fitted to at most so many tips, and to the
+extremes of the command in as many parts."""
 PERIOD = Config().control.period
 
 

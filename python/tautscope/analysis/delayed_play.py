@@ -12,7 +12,8 @@ from tautscope.analysis.models.constant_play import operator
 from tautscope.analysis.models.task import Floats, extremes, fit_samples
 
 SAMPLES = 4000
-"""Largest number of samples in the fit; a longer record is decimated."""
+"""Of a longer record, so many tips are in the fit, and those of up to four times as many samples,
+evenly over the record."""
 _PLAYS = np.linspace(-1, 1, 7)
 _TURN = 0.1
 """Motions below this share of the command's range are no strokes."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -68,11 +68,11 @@ def judge_all(
 
 def judge_episode(request: Request, episode: Episode) -> list[dict[str, Any]]:
     """A row for each degree of freedom; what an episode lacks is in its row."""
-    rows = []
+    rows, sheet = [], None
     for name, (command, tip) in zip(request.names, request.pairs, strict=True):
         row: dict[str, Any] = {"episode": episode.number, "name": name}
         try:
-            sheet = open_episode(request.folder, episode)
+            sheet = sheet or open_episode(request.folder, episode)
             row |= _row(_verdict(sheet, command, tip, request))
         except RecordError as error:
             row |= {"identified": False, "aligned": False, "missing": str(error)}
@@ -139,12 +139,13 @@ def summarize(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def _median_interval(ordered: Floats) -> tuple[float, float] | tuple[None, None]:
     """Distribution-free interval of at least 95 %: between the k-th values from both ends."""
+    from scipy.stats import binom  # noqa: PLC0415
+
     count = len(ordered)
-    shares = np.cumsum([math.comb(count, each) / 2**count for each in range(count + 1)])
-    k = int(np.searchsorted(shares, 0.025, side="right"))
+    k = int(binom.ppf(0.025, count, 0.5))
     return (float(ordered[k - 1]), float(ordered[count - k])) if k > 0 else (None, None)
 
 
 def _kind(text: str) -> str:
-    """A text without what differs between episodes."""
-    return "".join(letter for letter in text if not letter.isdigit())
+    """A text without its numbers, which differ between episodes."""
+    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "N", text)

@@ -91,8 +91,9 @@ def without_errors(record: Record) -> tuple[Record, list[Finding]]:
 def identify_without_repeats(record: Record) -> tuple[Record, Identification, list[Finding]]:
     """Identify the slack, without the samples at which the tip repeats a value while it moves.
 
-    A play at rest repeats its value rightly. So the model is fitted to the other samples, too: if
-    it contradicts the repeated ones, these were not measured, or the tip was at an end.
+    A play at rest repeats its value rightly. So the model is fitted to the other samples, too:
+    repeated ones that it contradicts were not measured, or the tip was at an end. Of an end, all
+    samples are left out at which the model is near it or beyond.
     """
     time, measured = record.clock, record.measured
     found = identify(time, record.command, measured)
@@ -107,10 +108,12 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
         return record, found, []
     other = identify(time, record.command, fresh)
     # Noise is cut off near an end: only the model may say which samples are clear of it.
-    for end, sign in ends.items():
-        fresh[sign * (end - other.predicted) < 2 * other.noise] = np.nan
-    if ends and np.count_nonzero(np.isfinite(fresh)) >= 50:
+    near = {end: sign * (end - other.predicted) < 2 * other.noise for end, sign in ends.items()}
+    fresh[np.any([is_held, *near.values()], axis=0)] = np.nan
+    if near and np.count_nonzero(np.isfinite(fresh)) >= 50:
         other = identify(time, record.command, fresh)
+    else:
+        near = {}
     error, extent = other.predicted - measured, float(np.ptp(other.predicted))
     passed = [
         end
@@ -125,17 +128,26 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
             repeated.append((a, b))
     if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * held:
         return record, found, []
-    findings = []
-    for name, places in (
-        ("it stays at its least or largest value while the command moves on", at_end),
-        ("it repeats its last value while the command moves", repeated),
+    findings, kept = [], measured.copy()
+    for name, places, others in (
+        (
+            "it stays at its least or largest value while the command moves on",
+            at_end,
+            [near[end] for end in passed if end in near],
+        ),
+        ("it repeats its last value while the command moves", repeated, []),
     ):
         if places:
-            count = sum(b - a + 1 for a, b in places)
+            before = np.count_nonzero(np.isfinite(kept))
+            for a, b in places:
+                kept[a : b + 1] = np.nan
+            for is_near in others:
+                kept[is_near] = np.nan
+            count = before - np.count_nonzero(np.isfinite(kept))
             longest = sorted(places, key=lambda run: run[0] - run[1])
             rows = tuple((int(record.rows[a]), int(record.rows[b])) for a, b in longest)
             findings.append(Finding("tip", f"{name}; {count} samples left out", rows))
-    return replace(record, measured=fresh), other, findings
+    return replace(record, measured=kept), identify(time, record.command, kept), findings
 
 
 def gain_finding(record: Record, gain: float) -> Finding | None:

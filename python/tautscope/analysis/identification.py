@@ -208,12 +208,12 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     weights = signals.solve(found)[0]
     width, delay = _jackknife(signals, found)
     is_at_limit = x[0] > 0.98 * _LARGEST or abs(x[2]) > 0.98
-    predicted, drift = _extended(time, signals, found, weights)
+    predicted, offset, drift = _extended(time, signals, found, weights)
     return Identification(
         width=width,
         delay=delay,
         gain=float(weights[0]),
-        offset=float(weights[1]),
+        offset=offset,
         radius=found.radius,
         rounding=found.rounding,
         drift=drift,
@@ -228,11 +228,14 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
 
 def _extended(
     time: Floats, signals: Signals, shape: Shape, weights: Floats
-) -> tuple[Floats, Floats]:
-    """Output of the model, and drift, at every sample of the record."""
+) -> tuple[Floats, float, Floats]:
+    """Output of the model, its offset, and the drift, at every sample of the record."""
     drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
     output = signals.output(shape, time)
-    return weights[0] * output + weights[1] + drift, drift - drift.mean()
+    # The polynomials have no mean over the samples of the fit, which may lie otherwise in time.
+    mean = float(drift.mean())
+    predicted = weights[0] * output + weights[1] + drift
+    return predicted, float(weights[1]) + mean, drift - mean
 
 
 def _grid(signals: Signals) -> list[Shape]:

@@ -157,7 +157,7 @@ def estimate_delay(
         SignalError: Times do not increase, shapes do not match, or a motor position is not finite.
     """
     times, motors, stamps, tips = _checked(times, motors, stamps, tips)
-    step = max(1, len(times) // MOST_POSITIONS)
+    step = -(-len(times) // MOST_POSITIONS)
     times, motors = times[::step], motors[::step]
     signals = [
         Signal(times, motors, dof, stamps, tips[:, dof])

@@ -33,7 +33,7 @@ SHARE = 0.4
 _PERIODS = (5.0, 6.1, 4.1)
 _LONGEST, _RATIO = 9.0, 0.875
 _SPEED_SHARE = 0.5
-_GROWTH_TIME = 2.0
+_START_TIME = 2.0
 _HELD_TIME = 1.0
 _IMAGE_DETECTORS = (
     "frozen",
@@ -56,7 +56,9 @@ _IMAGE_DETECTORS = (
 class Sines:
     """Sines of all degrees of freedom at once; arrays (n,) [m or rad], periods [s].
 
-    u = centre + amplitude min(t / 2 s, 1) sin(2 pi t / T)
+    u = centre + amplitude sin(2 pi s / T),    s = t^2 / 4 s until 2 s, then t - 1 s
+
+    The motion starts at rest, and is never faster than its sines.
     """
 
     centre: Floats
@@ -67,9 +69,9 @@ class Sines:
 
     def __call__(self, time: float) -> Floats:
         """Reference (n,) [m or rad] at a time [s from the start]."""
-        growth = min(time / _GROWTH_TIME, 1.0)
-        sines = np.sin(2 * np.pi * time / self.periods)
-        return np.asarray(self.centre + growth * self.amplitude * sines)
+        start = min(time, _START_TIME)
+        phases = 2 * np.pi * (time - start + start**2 / (2 * _START_TIME)) / self.periods
+        return np.asarray(self.centre + self.amplitude * np.sin(phases))
 
 
 def article_sines(config: Config) -> tuple[Floats, Floats]:

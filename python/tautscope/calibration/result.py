@@ -39,13 +39,15 @@ class CalibrationResult:
     def changes(self, at: datetime | None = None) -> dict[str, Any]:
         """The values and the record of the calibration, for `write_values` and `Config.replace`.
 
+        An infinite standard deviation, that of a value which is not determined, is not recorded.
+
         Args:
             at: When it was done; now by default.
         """
         record: dict[str, Any] = {
             "date": (at or datetime.now(UTC)).isoformat(timespec="seconds"),
             "serial_numbers": dict(self.serial_numbers),
-            "std": {key: rounded(std, std) for key, std in self.std.items()},
+            "std": {k: rounded(std, std) for k, std in self.std.items() if math.isfinite(std)},
         }
         if self.residual is not None:
             record["residual"] = rounded(self.residual, self.residual)

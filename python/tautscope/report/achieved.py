@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tautscope.config import Config
@@ -26,26 +28,29 @@ class Achieved:
     def __init__(self, config: Config) -> None:
         self._config, self._updates = config, 0
         most = round(WINDOW / config.control.period)
-        self._without, self._with = (RunRecorder(config, most) for _ in range(2))
+        self._recorders = {share: RunRecorder(config, most) for share in (0.0, 1.0)}
+        self._share, self._since = math.nan, math.inf
 
     def add_tick(self, sample: Sample, reference: Floats, command: Floats, share: float) -> None:
         """Add a tick with a share of the compensation, 0 to 1."""
-        if share in (0.0, 1.0):
-            recorder = self._with if share else self._without
-            recorder.add_tick(sample, reference, command)
+        if share != self._share:
+            self._share, self._since = share, sample.time
+        if share in self._recorders:
+            self._recorders[share].add_tick(sample, reference, command)
 
     def add_update(self, now: float, source: Frame | Measurement, report: Report) -> None:
         """Add an update by an image or a measurement that arrived at `now` [s]."""
         self._updates += 1
-        row = update_row(now, source, report, self._updates)
-        for recorder in (self._without, self._with):
-            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+        # What was captured earlier shows the tip with another share.
+        if self._share in self._recorders and source.captured_at >= self._since:
+            row = update_row(now, source, report, self._updates)
+            self._recorders[self._share].add_frame(row, report.delta_minus, report.delta_plus)
 
     def results(self) -> OperatorResults:
         """Of each degree of freedom; none where the tip was not measured with compensation."""
         without, with_it = (
-            Recording(*recorder.tables(), self._config, is_on, ())
-            for is_on, recorder in ((False, self._without), (True, self._with))
+            Recording(*recorder.tables(), self._config, share > 0, ())
+            for share, recorder in self._recorders.items()
         )
         if not _is_measured(with_it):
             return {}

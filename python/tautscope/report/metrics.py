@@ -114,13 +114,13 @@ def _width_at(x: Floats, height: Floats, deadband: float) -> float:
 
 
 def reduction(uncompensated: float | LoopWidth, compensated: float | LoopWidth) -> float:
-    """Reduction of hysteresis: 1 - compensated / uncompensated.
+    """Reduction of hysteresis: 1 - |compensated| / uncompensated.
 
     Both are mean widths, or both maxima. The ideal of Eq. (2) is 1 - 1 / free_gain. NaN if the
     uncompensated width is not positive.
     """
     before, after = float(uncompensated), float(compensated)
-    return 1.0 - after / before if before > 0 else np.nan
+    return 1.0 - abs(after) / before if before > 0 else np.nan
 
 
 def start_periods(widths: ArrayLike) -> float:
@@ -171,16 +171,16 @@ def largest_error(reference: ArrayLike, tip: ArrayLike) -> float:
 def creep(references: ArrayLike, tip: ArrayLike) -> float:
     """Travel of the tip (n,) while every reference of (n, 3) rests, in the unit of the tip.
 
-    A sample counts if no reference changed since the one before it. NaN if none does, or the tip is
-    not known.
+    A sample counts if no reference changed since the one before it, and the tip is known at both.
+    NaN if none does.
     """
     desired, actual = np.asarray(references, dtype=np.float64), np.asarray(tip, dtype=np.float64)
     if desired.ndim != 2 or desired.shape[0] != actual.shape[0]:
         raise SignalError("references", desired.shape, f"one row for each of {len(actual)} samples")
     rests = np.all(np.diff(desired, axis=0) == 0, axis=1)
-    if not (np.isfinite(actual).any() and rests.any()):
-        return np.nan
-    return float(np.nansum(np.abs(np.diff(actual))[rests]))
+    steps = np.abs(np.diff(actual))[rests]
+    known = steps[np.isfinite(steps)]
+    return float(known.sum()) if known.size else np.nan
 
 
 def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
@@ -233,13 +233,13 @@ def overshoot(reference: ArrayLike, tip: ArrayLike) -> float:
         0 if the tip never overshoots; NaN if nothing moves or a value is not known.
     """
     reference, tip = _pair("reference", reference, "tip", tip)
-    largest = np.nan
+    peaks = []
     for first, last in pairwise(_reversals(reference)):
         sign = np.sign(reference[last] - reference[first])
         stroke = slice(first, last + 1)
         ahead, moved = sign * (tip[stroke] - reference[stroke]), sign * (tip[stroke] - tip[first])
-        largest = np.maximum(np.nan_to_num(largest), np.minimum(ahead, moved).max())
-    return float(largest)
+        peaks.append(np.minimum(ahead, moved).max())
+    return float(np.max([0.0, *peaks])) if peaks else np.nan
 
 
 def _reversals(signal: Floats) -> list[int]:

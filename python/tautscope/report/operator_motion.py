@@ -156,8 +156,8 @@ def evaluate_operator_motion(
 
 def evaluate_uncompensated_motion(recording: Recording) -> OperatorResults:
     """The figures of every DOF from a run without compensation; those of compensation are NaN."""
-    unknown = dict.fromkeys(("compensated_rms", "reduction", "largest", "bound"), np.nan)
-    found = evaluate_operator_motion(recording, recording)
+    unknown = dict.fromkeys(("compensated_rms", "reduction", "largest"), np.nan)
+    found = evaluate_operator_motion(recording, recording, has_bound=False)
     return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 

@@ -55,7 +55,7 @@ class DofResult:
     compensated_max: float = figure("compensated width, largest", "This loop where it is widest.")
     reduction: float = figure(
         "reduction",
-        "Share of the mean width that compensation removes: 1 - compensated / uncompensated.",
+        "Share of the mean width that compensation removes: 1 - |compensated| / uncompensated.",
         "share",
         "min",
         0.95,
@@ -157,15 +157,23 @@ def evaluate_uncompensated(recording: Recording) -> Results:
 def combine(
     results: Sequence[dict[NamedDof, Figures]], how: Literal["median", "worst"]
 ) -> dict[NamedDof, Figures]:
-    """Median or worst value of every figure over seeds; unknown ones are skipped."""
+    """Median or worst value of every figure over seeds; unknown ones are skipped.
+
+    The worst width is the one farthest from 0, which is negative where the tip leads.
+    """
     combined = {}
     for dof, figures in results[0].items():
         values = {}
         for row in rows_of(type(figures)):
             found = [getattr(result[dof], row.name) for result in results]
             known = [value for value in found if not np.isnan(value)]
-            function = np.median if how == "median" else max if row.worst == "max" else min
-            values[row.name] = float(function(known)) if known else np.nan
+            if how == "median":
+                value = np.median(known) if known else np.nan
+            elif row.worst == "max":
+                value = max(known, key=abs, default=np.nan)
+            else:
+                value = min(known, default=np.nan)
+            values[row.name] = float(value)
         combined[dof] = replace(figures, **values)
     return combined
 

@@ -106,8 +106,8 @@ def read_record(
             is open, for several records of it.
         command: Column of the actuator position.
         measured: Column of the tip position.
-        time: Column of the time, in s or the unit of its title, since 1970 by its size, or a date
-            or time of day.
+        time: Column of the time, in the unit of its title; without one in s, or since 1970 in s,
+            ms, us or ns by its size; or a date or time of day.
         tip_path: File of the tip, with a time of the same clock, if it is not in the first.
         missing: Values that stand for none, such as -9999.
 
@@ -165,7 +165,7 @@ def _read(
         if unit and unit not in TIMES:
             allowed = f"one of {', '.join(TIMES)}"
             raise RecordError(f"{sheet.file}, column {time}", f"unit {unit}", allowed)
-        table[:, -1] = stamps * time_scale(float(np.nanmedian(stamps)), unit)
+        table[:, -1] = stamps * (TIMES[unit] if unit else time_scale(float(np.nanmedian(stamps))))
     return table, found.rows, tuple(found.units.get(name, "") for name in names)
 
 
@@ -202,7 +202,7 @@ def read_motors(
     if not len(table):
         raise RecordError(str(path), "no line with all columns", "at least one")
     if "time" not in named:
-        table[:, 0] *= time_scale(float(np.median(table[:, 0])), "")
+        table[:, 0] *= time_scale(float(np.median(table[:, 0])))
     for column, (name, known) in enumerate(zip(names, (TIMES, *map(units_of, Dof)), strict=True)):
         if name in named and named[name] not in known:
             allowed = f"one of {', '.join(known)}; type --units {name}=UNIT"

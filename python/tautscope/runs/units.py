@@ -88,12 +88,12 @@ def units_of(dof: Dof) -> Mapping[str, float]:
     return LENGTHS if dof is Dof.INSERTION else ANGLES
 
 
-def time_scale(largest: float, unit: str) -> float:
-    """Seconds per tick; times since 1970 are in s, ms, us or ns by their size."""
+def time_scale(largest: float) -> float:
+    """Seconds per tick of times without a unit: since 1970 in s, ms, us or ns by their size."""
     for least, scale in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
         if largest > least:
             return scale
-    return TIMES.get(unit, 1.0)
+    return 1.0
 
 
 def parse_units(text: str) -> dict[str, str]:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope._core import move_along_curve
-from tautscope.analysis.models.task import Floats, Prediction, Task, fit_samples
+from tautscope.analysis.models.task import Floats, Prediction, Task, extremes, fit_samples
 
 _LIMIT = 18.0
 """atanh of the largest |w| below 1 in double precision."""
@@ -20,7 +20,7 @@ _LOG_W = np.log(-np.expm1(-2 * _ABS_P)) - np.log1p(np.exp(-2 * _ABS_P))
 _SIGMA, _EXPONENT, _TRAVEL = (0.5, 5.0), (1.0, 20.0), (1.0, 200.0)
 """Bounds of sigma, n, and rho times the command's range."""
 _SAMPLES = 5000
-"""Largest number of samples in a fit; a longer record is decimated."""
+"""Of a longer record, at most so many tips and extremes of the command are in the fit."""
 _STARTS = (5.0, 15.0, 50.0)
 """Initial values of rho times the command's range; the best fit is taken."""
 
@@ -92,8 +92,9 @@ def fit(command: Floats, measured: Floats) -> BoucWen:
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
     if len(command) > _SAMPLES:
-        kept = np.flatnonzero(np.isfinite(measured))
-        kept = kept[:: -(-len(kept) // _SAMPLES)]
+        seen = np.flatnonzero(np.isfinite(measured))
+        turns = extremes(command, -(-2 * len(command) // _SAMPLES))
+        kept = np.union1d(seen[:: -(-len(seen) // _SAMPLES)], turns)
         command, measured = command[kept], measured[kept]
     where = fit_samples(command, measured)
     target = measured[where]

@@ -1,13 +1,14 @@
 """Components of the weighted mixture: predictions of the tip by different models of a record.
 
-All quantities are normalised: the command's range in the first half is 1 with 0 in its middle, and
-so is the tip's, whose direction is that of the command.
+All quantities are normalised: the command's range in the first half is 1 with 0 in its middle, the
+tip's is 1 with 0 at its mean, and its direction is that of the command.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -75,19 +76,20 @@ class Signals:
     Attributes:
         command: (n,).
         measured: (n,) tip, NaN where it was not measured.
-        at: (s,) the samples with a measured tip.
-        travel: (n,) travel of the command since the start.
     """
 
     command: Floats
     measured: Floats
-    at: NDArray[np.intp] = field(init=False)
-    travel: Floats = field(init=False)
 
-    def __post_init__(self) -> None:
-        moved = np.abs(np.diff(self.command, prepend=self.command[0]))
-        object.__setattr__(self, "at", np.flatnonzero(np.isfinite(self.measured)))
-        object.__setattr__(self, "travel", np.cumsum(moved))
+    @cached_property
+    def at(self) -> NDArray[np.intp]:
+        """(s,) the samples with a measured tip."""
+        return np.flatnonzero(np.isfinite(self.measured))
+
+    @cached_property
+    def travel(self) -> Floats:
+        """(n,) travel of the command since the start."""
+        return np.cumsum(np.abs(np.diff(self.command, prepend=self.command[0])))
 
 
 def adaptive_operator(signals: Signals) -> Component:

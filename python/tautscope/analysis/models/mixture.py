@@ -21,7 +21,7 @@ MEMORIES = (0.8, 0.9, 0.95, 0.98, 0.995)
 SECOND_MEMORY = 0.9
 """Discount by which the mixtures of all memories are weighted."""
 BLOCK = 1024
-"""Tips that are weighted at a time; the least discount to this power must be a normal number."""
+"""Tips that are weighted at a time, which bounds the memory."""
 FLOOR = 1e-3
 """Least error that is told from none, as a share of the tip's range."""
 
@@ -123,8 +123,13 @@ def _terms(errors: Floats) -> Floats:
 
 def _discounted(terms: Floats, discounts: Floats, past: Floats) -> Floats:
     """Discounted sums (j, b, i) of terms (j, i) up to each, for sums (b, i) before the first."""
-    growth = discounts[:, None] ** -np.arange(1.0, len(terms) + 1)[:, None, None]
-    return np.asarray((past + np.cumsum(terms[:, None] * growth, axis=0)) / growth)
+    from scipy.signal import lfilter  # noqa: PLC0415
+
+    found = [
+        lfilter([1.0], [1.0, -b], terms, axis=0, zi=b * own[None])[0]
+        for b, own in zip(discounts, past, strict=True)
+    ]
+    return np.stack(found, axis=1)
 
 
 def _weights(sums: Floats) -> Floats:

@@ -39,7 +39,8 @@ _SHARE = (1.0, 0.0, 0.6)
 """Amplitude relative to that of the experiment."""
 _TURNS = (1, 1, 2)
 """Periods in the motion."""
-LEAST_IMAGES = 20
+LEAST_IMAGES = 30
+"""A sequence has more once every second image was dropped."""
 LEAST_CHANGE = 24.0
 """A pixel has changed if a channel differs from its median by more [grey levels]."""
 LEAST_SHARE = 0.6
@@ -166,7 +167,7 @@ def find_moving_bands(
         _candidate(images[some], own, np.concatenate([tissue, others]), regressors[some])
         for own, others in _clusters(moving)
     ]
-    best = max(candidates, key=lambda each: each.score)
+    best = max(candidates, key=lambda each: (each.score, each.share))
     if best.share < LEAST_SHARE:
         raise CalibrationError(
             "No colour of the moving pixels has two bands in most images; the best has them in "
@@ -174,12 +175,12 @@ def find_moving_bands(
             "Are both bands in view all the time, matt, and of a colour of their own? Else use "
             "--click, or masks",
         )
+    best = _evaluate(images, best.weights, best.threshold, regressors)
     if best.following < LEAST_FOLLOWING:
         raise CalibrationError(
             f"The motors explain only {best.following:.0%} of the motion of the bands",
             "Does the instrument follow its motors, and do images and positions belong together?",
         )
-    best = _evaluate(images, best.weights, best.threshold, regressors)
     for _ in range(_ITERATIONS):
         found = _labelled(images, best)
         marker = np.concatenate(
@@ -228,8 +229,8 @@ def _split(images: Sequence[Image]) -> tuple[Image, Image]:
             "Is the instrument in view, are the motors coupled to it, and is the image not "
             "overexposed? Else use --click, or masks",
         )
-    own = own[:: max(len(own) // _MOST_PIXELS, 1)]
-    return own, tissue[:: max(len(tissue) // (5 * _MOST_PIXELS), 1)]
+    own = own[:: -(-len(own) // _MOST_PIXELS)]
+    return own, tissue[:: -(-len(tissue) // (5 * _MOST_PIXELS))]
 
 
 def _matched(image: Image, other: Image) -> Image:
@@ -282,8 +283,10 @@ def _evaluate(
     rows = regressors[is_found]
     solution, *_ = np.linalg.lstsq(rows, middle, rcond=None)
     variance = middle.var(axis=0).sum()
-    left = (middle - rows @ solution).var(axis=0).sum()
-    following = 1 - left / variance if variance > 1 else 0.0
+    # The adjusted share: as many regressors explain much of any few positions.
+    free = len(rows) - rows.shape[1]
+    left = (middle - rows @ solution).var(axis=0).sum() * (len(rows) - 1) / max(free, 1)
+    following = max(1 - left / variance, 0.0) if variance > 1 and free > 0 else 0.0
     return _Candidate(weights, threshold, bands, float(following))
 
 
@@ -293,14 +296,10 @@ def _centre(bands: tuple[Mask, Mask]) -> Floats:
 
 
 def _regressors(times: Floats, positions: Floats) -> Floats:
-    """The positions now and before, and their squares: (n, columns), with a constant."""
+    """The positions now and before: (n, columns), with a constant."""
     spread = np.ptp(positions, axis=0)
     moved = positions[:, spread > 0] / np.where(spread > 0, spread, 1)[spread > 0]
     if not moved.shape[1]:
         raise CalibrationError("The motors did not move", "Are the drives enabled?")
-    columns = [np.ones(len(times))]
-    for lag in _LAGS:
-        for dof in moved.T:
-            delayed = np.interp(times - lag, times, dof)
-            columns += [delayed, delayed**2]
-    return np.column_stack(columns)
+    delayed = [np.interp(times - lag, times, dof) for lag in _LAGS for dof in moved.T]
+    return np.column_stack([np.ones(len(times)), *delayed])

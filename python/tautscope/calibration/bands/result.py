@@ -102,7 +102,7 @@ def colour_result(
 def _of(images: Sequence[LabelledImage], label: int) -> Image:
     """The pixels (n, 3) of a label in all images, at most `_MOST_PIXELS`."""
     pixels = np.concatenate([image.pixels(label) for image in images])
-    return np.asarray(pixels[:: max(len(pixels) // _MOST_PIXELS, 1)], np.uint8)
+    return np.asarray(pixels[:: max(-(-len(pixels) // _MOST_PIXELS), 1)], np.uint8)
 
 
 def _check(fit: ColourFit) -> None:

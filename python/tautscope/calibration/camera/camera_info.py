@@ -109,7 +109,7 @@ def _matrix(name: str, rows: int, columns: int, values: Sequence[float]) -> str:
 def _number(path: Path, document: dict[str, Any], *names: str) -> float:
     value = next((document[name] for name in names if name in document), None)
     if not _is_number(value) or not value >= 1:
-        raise FieldError(f"{path}: {names[0]}", value, "a number above 0")
+        raise FieldError(f"{path}: {names[0]}", value, "a number, at least 1")
     return float(value)
 
 
@@ -117,8 +117,12 @@ def _numbers(path: Path, document: dict[str, Any], *names: str) -> list[float]:
     """Numbers of a matrix with rows, cols and data, or of a list."""
     value = next((document[name] for name in names if name in document), None)
     data = value.get("data") if isinstance(value, dict) else value
-    if not isinstance(data, list) or not data or not all(map(_is_number, data)):
-        raise FieldError(f"{path}: {names[0]}.data", None, "a list of finite numbers")
+    field, allowed = f"{path}: {names[0]}.data", "a list of finite numbers"
+    if not isinstance(data, list) or not data:
+        raise FieldError(field, data, allowed)
+    for each in data:
+        if not _is_number(each):
+            raise FieldError(field, each, allowed)
     return [float(each) for each in data]
 
 

@@ -72,7 +72,8 @@ class Recording:
         features: (images, 4) u and v of bands A and B [px]; NaN where a band was not found.
         patches: The images, for a second detection with the fitted geometry; empty without images.
         reasons: Why bands were not found: text -> number of images.
-        saturated: Median share of saturated pixels (a channel at 255) around the bands.
+        saturated: Median share of saturated pixels (a channel at 255) around the bands, or of the
+            whole image in a format without one element per pixel.
     """
 
     time: Floats
@@ -87,8 +88,8 @@ class Recording:
         """Check shapes and numbers.
 
         Raises:
-            SignalError: An array has another shape, motors or times are not finite, or the time
-                does not increase.
+            SignalError: An array has another shape, motors or times are not finite, the time does
+                not increase, or images are not in order.
         """
         ticks, images = len(self.time), len(self.captured_at)
         for name, shape in (
@@ -103,6 +104,8 @@ class Recording:
         for name in ("time", "motors", "captured_at"):
             if not np.isfinite(getattr(self, name)).all():
                 raise SignalError(name, "a number that is not finite", "finite numbers")
+        if (np.diff(self.captured_at) < 0).any():
+            raise SignalError("captured_at", "a time before the last", "times in order")
         if (np.diff(self.time) <= 0).any():
             raise SignalError("time", "a time that does not increase", "increasing times")
         if self.patches and len(self.patches) != images:
@@ -155,7 +158,10 @@ class Recorder(ImageRecorder):
         features = detection.features if detection.valid else np.full(4, np.nan)
         self._regions.append((captured_at, self._by_regions(image)))
         patch = self._patch(image, detection)
-        is_saturated = patch.pixels.max(axis=-1) == 255 if patch.pixels.size else np.zeros(1)
+        pixels = patch.pixels
+        if pixels.ndim == 2:  # planes: brightness, and below it colour
+            pixels = pixels[: self._camera.height, :, None]
+        is_saturated = pixels.max(axis=-1) == 255 if pixels.size else np.zeros(1)
         self._images.append((captured_at, features, patch, float(np.mean(is_saturated))))
         return detection
 

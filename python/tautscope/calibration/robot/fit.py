@@ -61,14 +61,15 @@ def fit(record: MotionRecord, config: Config, keep: Sequence[str] = ()) -> Robot
     """Least squares over all measurements, with soft-L1 loss.
 
     A measurement z of covariance R is at h(q; theta), where the state q is that of the plays,
-    m(phi), to a deviation of covariance P; with J = dh/dq,
+    m(phi), to a deviation of covariance P; with J = dh/dq, the sum over the components of all
 
-        sum over z of rho(|V^-1/2 (z - h(m(phi); theta))|^2),     V = R + J P J'.
+        rho((L^-1 (z - h(m(phi); theta)))_k^2),     L L' = V = R + J P J'.
 
     P and the standard deviations of the sensors are estimated from the residuals, twice. Standard
     deviations are those of blocks of 2 s whose errors may be one (sandwich estimator), and not
-    below those of independent errors. Each parameter has a wide prior; one whose standard deviation
-    remains above half of the prior's is not determined, nor is a gain that may be 0.
+    below those of independent errors. Each parameter has a wide prior, as a residual with the same
+    loss; one whose standard deviation remains above half of the prior's is not determined, nor is a
+    gain that may be 0.
 
     Raises:
         CalibrationError: There are too few measurements.
@@ -169,7 +170,8 @@ class _Fitting:
             values[name] = total * model.signs[index]
             stds[name] = float(np.sqrt(covariance[own, own].sum()))
             is_wide = stds[name] > UNDETERMINED * WEIGHT_STD * np.sqrt(PLAYS)
-            if is_wide or total < LEAST_GAIN * stds[name]:
+            # Weights at their bound of 0 have no standard deviation.
+            if is_wide or total < LEAST_GAIN * stds[name] or stds[name] == 0:
                 lost.append(name)
             widths = 2 * model.half_widths[index]
             values[f"dof.{dof.name}.slack"] = float(p[own] @ widths / max(total, 1e-9))

@@ -18,7 +18,7 @@ from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, check
 PLAYS = 8
 """Parallel plays of a degree of freedom, with half widths from 0 to half of `width_limit`."""
 MOST = 200
-"""Measurements that are used, evenly in time."""
+"""Measurements of a sensor that are used, evenly in time."""
 BEFORE = 0.1
 """Share of the motion before the first that is used: the plays start in an unknown state."""
 _STEP = 1e-4
@@ -168,7 +168,9 @@ def _own(record: MotionRecord) -> list[Measurement]:
     span = record.times[-1] - record.times[0]
     after = record.times[0] + BEFORE * span
     found = [each for each in record.measurements if each.captured_at > after]
-    return [replace(each) for each in found[:: max(1, -(-len(found) // MOST))]]
+    own = [[each for each in found if each.sensor == k] for k in {each.sensor for each in found}]
+    kept = [each for of in own for each in of[:: -(-len(of) // MOST)]]
+    return [replace(each) for each in sorted(kept, key=lambda each: each.captured_at)]
 
 
 def _groups(measurement: Measurement, count: int) -> list[str]:

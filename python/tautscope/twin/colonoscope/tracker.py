@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,7 +68,7 @@ class EmTracker:
         pose = Pose(
             position + drift + noise[:3],
             time + self._stamp_error,
-            without_roll(direction) @ _rotation(noise[3:]),
+            without_roll(direction) @ cv2.Rodrigues(noise[3:])[0],
         )
         self._in_transit.append((time + self._delay, pose))
         self._count += 1
@@ -89,14 +90,3 @@ def without_roll(direction: Floats) -> Floats:
     x, y, z = direction
     k = 1 / (1 + z)
     return np.array([[1 - x * x * k, -x * y * k, x], [-x * y * k, 1 - y * y * k, y], [-x, -y, z]])
-
-
-def _rotation(vector: Floats) -> Floats:
-    """Rotation matrix (3, 3) by a small vector (3,) [rad], Rodrigues' formula."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return rotation
