@@ -130,7 +130,8 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     cycle: Positive = 0.01
     """Time from one set-point to the next [s], whole milliseconds."""
     reply_timeout: Positive = 0.006
-    """How long a cycle waits for the drives' answers; later ones are counted [s]."""
+    """How long a cycle waits for the drives' answers; later ones are counted, and their positions
+    not checked [s]."""
     lead_points: Annotated[int, Meta(ge=0, le=16)] = 2
     """Set-points in the drive's input buffer in mode 7; each adds a delay of one cycle and
     tolerates jitter of one."""
@@ -141,7 +142,7 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     heartbeat_timeout: Positive = 0.08
     """Time without a heartbeat after which drives quick-stop [s], whole milliseconds; of servos,
     without an answer or a set-point; watchdog time of a microcontroller, and of Dynamixel, rounded
-    up to 20 ms."""
+    up to 20 ms. All are stopped too if answers of a motor are late for so long."""
     state_timeout: Positive = 1.0
     """Timeout of each state transition [s]."""
     request_timeout: Positive = 0.3

@@ -175,7 +175,7 @@ class Drives:
             SignalError: The command is not finite, leaves the travel or is too fast.
             StateError: A drive left operation enabled or its mode, or ignores set-points.
             FollowingError: The following error is too large.
-            SilentDriveError: A drive has not answered for `heartbeat_timeout`.
+            SilentDriveError: A drive has not answered in time for `heartbeat_timeout`.
             HeartbeatError: A drive's heartbeat is missing.
             EmergencyError: A drive sent an emergency object.
             SecondMasterError: Another master commands the drives.
