@@ -197,8 +197,8 @@ class Cia402Drives(DriveGroup):
         time.sleep(max(0.0, self._config.cycle - (time.monotonic() - began)))
 
     def _run_transition(self, step: Callable[[Motor, State | None, Feedback], bool]) -> None:
-        """Cycle until `step` is true for every drive; each state has its own timeout."""
-        seen: list[int | None] = [None] * len(self._targets)
+        """Cycle until `step` is true for every drive; each new state has a timeout of its own."""
+        seen: list[set[State | None]] = [set() for _ in self._targets]
         since = [time.monotonic()] * len(self._targets)
         timeout = self._config.state_timeout
         while True:
@@ -207,10 +207,12 @@ class Cia402Drives(DriveGroup):
             for dof in self._config.all_motors:
                 feedback = self._feedback[dof]
                 has_answered = not feedback.age or bool(feedback.statusword)
-                is_done = has_answered and step(dof, cia402.state_of(feedback.statusword), feedback)
+                state = cia402.state_of(feedback.statusword)
+                is_done = has_answered and step(dof, state, feedback)
                 all_done = all_done and is_done
-                if is_done or feedback.statusword != seen[dof]:
-                    seen[dof], since[dof] = feedback.statusword, time.monotonic()
+                if is_done or state not in seen[dof]:
+                    seen[dof].add(state)
+                    since[dof] = time.monotonic()
                 elif time.monotonic() - since[dof] > timeout:
                     raise transition_error(self._bus.name(dof), feedback, self._modes[dof], timeout)
             if all_done:
