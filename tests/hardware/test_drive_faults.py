@@ -152,6 +152,15 @@ def test_unconfirmed_disabling_raises(hub: Hub, bench: Bench) -> None:
         rig.clear(Dof.ROTATION)
 
 
+def test_disabling_disables_the_others_though_one_does_not_stop(hub: Hub, bench: Bench) -> None:
+    with running(hub, bench, state_timeout=1.0) as (rig, drives):
+        rig.inject("drop", Dof.ROTATION)
+        with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
+            drives.disable()
+        assert rig.states[Dof.INSERTION] is rig.states[Dof.BENDING] is State.SWITCH_ON_DISABLED
+        rig.clear(Dof.ROTATION)
+
+
 @pytest.mark.parametrize(
     ("command", "message"),
     [

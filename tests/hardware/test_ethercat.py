@@ -213,6 +213,39 @@ def test_motors_follow_and_stop(mode: int) -> None:
     assert master.state == INIT
 
 
+class Slowing(SimulatedDrive):
+    """A drive that slows down on a quick stop ramp, by 5 counts per cycle in each."""
+
+    speed = speed_at_the_end = 0
+
+    def on_sync(self, now: float) -> None:
+        before = self.demand
+        super().on_sync(now)
+        if self.status is State.OPERATION_ENABLED:
+            self.speed = self.demand - before
+        elif self.status is State.QUICK_STOP_ACTIVE:
+            self.speed -= min(max(self.speed, -5), 5)
+            self.demand += self.speed
+
+    def _enter(self, target: State, now: float) -> None:
+        if target is State.SWITCH_ON_DISABLED:
+            self.speed_at_the_end = self.speed
+        super()._enter(target, now)
+
+
+def test_voltage_stays_until_the_motors_have_slowed_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "SimulatedDrive", Slowing)
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        for _ in range(10):
+            drives.exchange(drives.last_command + np.array([0.0, 0.01, 0.0]))
+        rotation = master.slaves[Dof.ROTATION].drive
+        assert rotation.speed == -100
+        drives.disable()
+        assert states(master) == {State.SWITCH_ON_DISABLED}
+        assert rotation.speed_at_the_end == 0
+
+
 def running(soem: Any, config: DrivesConfig) -> Drives:
     drives = Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
     drives.start()

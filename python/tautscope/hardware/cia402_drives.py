@@ -152,6 +152,7 @@ class Cia402Drives(DriveGroup):
         return self._command_until(cia402.QUICK_STOP, cia402.STOPPED_STATES)
 
     def _switch_off(self) -> list[str]:
+        self._await_rest(lambda: self._bus.broadcast(cia402.QUICK_STOP, self._targets))
         return self._command_until(cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES)
 
     def close(self) -> None:
