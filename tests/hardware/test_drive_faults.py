@@ -12,7 +12,9 @@ import numpy as np
 import paced_motion
 import pytest
 from drive_settings import drives_config
+from tautscope.bench import drives as simulated
 from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.dof import Dof
 from tautscope.errors import (
@@ -116,6 +118,30 @@ def test_fault_persists_until_it_is_reset(hub: Hub, bench: Bench) -> None:
         assert at_rest(rig)
         drives.start(reset_faults=True)
         assert set(rig.states.values()) == {State.OPERATION_ENABLED}
+
+
+class Resuming(SimulatedDrive):
+    """A drive that enable operation brings from quick stop active back to operation enabled."""
+
+    def _control(self, word: int, now: float) -> None:
+        if self.status is State.QUICK_STOP_ACTIVE and word & 0x0F == 0x0F:
+            self._enter(State.OPERATION_ENABLED, now)
+        else:
+            super()._control(word, now)
+
+
+def test_reset_of_a_fault_enables_no_held_drive(
+    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulated, "SimulatedDrive", Resuming)
+    with running(hub, bench) as (rig, drives):
+        drives.stop()
+        rig.inject("fault", Dof.BENDING)
+        until(lambda: rig.states[Dof.BENDING] is State.FAULT)
+        count = len(rig.events)
+        drives.start(reset_faults=True)
+        states = [one.what for one in rig.events[count:] if one.dof == Dof.INSERTION.label]
+        assert states[0] == "switch on disabled"
 
 
 @pytest.mark.parametrize("is_running", [True, False])

@@ -138,9 +138,10 @@ class Cia402Drives(DriveGroup):
             SilentDriveError: A drive did not answer within `state_timeout`.
         """
         self._was_enabled = True
+        # Not those of an earlier run, which would enable drives that quick stop holds.
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
         if reset_faults:
             self._run_transition(self._reset_fault)
-        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
         self._run_transition(self._enable)
         if Mode.INTERPOLATED_POSITION in self._modes.values():
             for _ in range(self._config.lead_points):
