@@ -261,6 +261,36 @@ def test_fault_stops_all_drives() -> None:
         assert states(master) <= STOPPED_STATES
 
 
+def test_the_others_are_stopped_before_the_error_code_is_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        first, second = (slave.drive for slave in master.slaves[:2])
+        second.fail(0.0)
+        read, found = Slave.sdo_read, list[State]()
+
+        def sdo_read(slave: Slave, index: int, subindex: int) -> bytes:
+            found.append(first.status)
+            return read(slave, index, subindex)
+
+        monkeypatch.setattr(Slave, "sdo_read", sdo_read)
+        with pytest.raises(EmergencyError):
+            drives.exchange(drives.last_command)
+        assert found == [State.QUICK_STOP_ACTIVE]
+
+
+def test_faults_of_all_drives_are_reset_at_once() -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        for slave in master.slaves:
+            slave.drive.fail(0.0)
+        with pytest.raises(EmergencyError):
+            drives.exchange(drives.last_command)
+        drives.start(reset_faults=True)
+        assert states(master) == {State.OPERATION_ENABLED}
+
+
 def test_broken_line_stops_all_drives() -> None:
     soem, master, config = line()
     with running(soem, config) as drives:
