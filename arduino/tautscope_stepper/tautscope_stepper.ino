@@ -20,6 +20,7 @@ struct Motor {
 volatile Motor motors[AXES];
 volatile uint16_t ticks;  // since the last set-points
 volatile uint32_t milliseconds;
+uint16_t interval;  // in which the next set-points are expected [ticks]; 0 before the first
 
 // Move each motor by at most one step. Steps are spread over the time between two set-points.
 ISR(TIMER1_COMPA_vect) {
@@ -50,14 +51,16 @@ int32_t position(uint8_t axis) {
 }
 
 void set_target(uint8_t axis, int32_t counts) {
-  static uint16_t duration;
   if (axis == 0) {
     noInterrupts();
-    duration = ticks;
+    uint16_t since = ticks;
     ticks = 0;
     interrupts();
-    if (duration > LONGEST_MOVE || duration == 0) duration = LONGEST_MOVE;
+    if (since > LONGEST_MOVE) since = interval ? LONGEST_MOVE : 0;
+    // Those that come soon after late ones are no reason to hurry.
+    interval = max(since, interval - interval / 8);
   }
+  uint16_t duration = interval ? interval : LONGEST_MOVE;
   int32_t distance = counts - position(axis);
   uint16_t left = min(labs(distance), 0xFFFFL);
   // Half a step more, so that the last one comes in time; at most a step every other tick.
@@ -78,6 +81,7 @@ void stop() {
 
 void enable(bool on) {
   stop();
+  interval = 0;
   digitalWrite(ENABLE_PIN, on ? LOW : HIGH);
 }
 

@@ -36,6 +36,9 @@ class FakeMotors:
         self.commands.append(np.array(command))
         return np.array(command)
 
+    def stop(self) -> None:
+        pass
+
     def disable(self) -> None:
         self.disabled += 1
 

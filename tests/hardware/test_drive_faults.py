@@ -12,7 +12,9 @@ import numpy as np
 import paced_motion
 import pytest
 from drive_settings import drives_config
+from tautscope.bench import drives as simulated
 from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.drive import SimulatedDrive
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.dof import Dof
 from tautscope.errors import (
@@ -118,6 +120,30 @@ def test_fault_persists_until_it_is_reset(hub: Hub, bench: Bench) -> None:
         assert set(rig.states.values()) == {State.OPERATION_ENABLED}
 
 
+class Resuming(SimulatedDrive):
+    """A drive that enable operation brings from quick stop active back to operation enabled."""
+
+    def _control(self, word: int, now: float) -> None:
+        if self.status is State.QUICK_STOP_ACTIVE and word & 0x0F == 0x0F:
+            self._enter(State.OPERATION_ENABLED, now)
+        else:
+            super()._control(word, now)
+
+
+def test_reset_of_a_fault_enables_no_held_drive(
+    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulated, "SimulatedDrive", Resuming)
+    with running(hub, bench) as (rig, drives):
+        drives.stop()
+        rig.inject("fault", Dof.BENDING)
+        until(lambda: rig.states[Dof.BENDING] is State.FAULT)
+        count = len(rig.events)
+        drives.start(reset_faults=True)
+        states = [one.what for one in rig.events[count:] if one.dof == Dof.INSERTION.label]
+        assert states[0] == "switch on disabled"
+
+
 @pytest.mark.parametrize("is_running", [True, False])
 def test_disable_quick_stops_before_it_disables_voltage(
     hub: Hub, bench: Bench, *, is_running: bool
@@ -149,6 +175,15 @@ def test_unconfirmed_disabling_raises(hub: Hub, bench: Bench) -> None:
         with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
             drives.disable()
         assert rig.states[Dof.INSERTION] is State.SWITCH_ON_DISABLED
+        rig.clear(Dof.ROTATION)
+
+
+def test_disabling_disables_the_others_though_one_does_not_stop(hub: Hub, bench: Bench) -> None:
+    with running(hub, bench, state_timeout=1.0) as (rig, drives):
+        rig.inject("drop", Dof.ROTATION)
+        with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
+            drives.disable()
+        assert rig.states[Dof.INSERTION] is rig.states[Dof.BENDING] is State.SWITCH_ON_DISABLED
         rig.clear(Dof.ROTATION)
 
 

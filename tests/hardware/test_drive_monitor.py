@@ -1,11 +1,11 @@
-"""A position that jumps among the recent commands, where no following error shows it."""
+"""What following errors do not show: a jump among the recent commands, answers that are late."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from drive_settings import drives_config
-from tautscope.errors import FollowingError
+from tautscope.errors import FollowingError, SilentDriveError
 from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.drive_monitor import DriveMonitor
 
@@ -38,3 +38,20 @@ def test_a_jump_is_more_than_twice_the_speed_limit_allows() -> None:
 
 def test_a_motor_that_was_silent_may_have_moved_farther() -> None:
     assert position_after_a_ramp(16.1e-3, age=3) == pytest.approx(16.1e-3)
+
+
+def test_answers_that_all_come_late_are_silence() -> None:
+    """Of a blocked motor nothing else would end the run; one answer in time begins anew."""
+    config = drives_config(heartbeat_timeout=0.2)
+    monitor = DriveMonitor(config, ("insertion", "rotation", "bending"), pending=1)
+    late, others = Feedback(age=1, silence=1e-3), (Feedback(), Feedback())
+    start = monitor.reset((Feedback(), *others))
+    step = np.array([config.insertion.speed_limit * config.cycle, 0.0, 0.0])
+    most = round(config.heartbeat_timeout / config.cycle)
+    for _ in range(most):
+        monitor.check(start, (late, *others))
+    monitor.check(start, (Feedback(), *others))
+    for tick in range(most):
+        monitor.check(start + step * tick, (late, *others))
+    with pytest.raises(SilentDriveError, match=r"insertion: no answer to 11 set-points in time"):
+        monitor.check(start + step * most, (late, *others))

@@ -201,6 +201,49 @@ def test_drive_under_another_command_is_named(
         move(config)
 
 
+class Restless(SimulatedDrive):
+    """A drive without mains whose statusword changes all the time, until it has done so often."""
+
+    changes = 0
+    most = 1000
+
+    def _is_restless(self) -> bool:
+        self.changes += 1
+        return self.changes < self.most
+
+
+class Toggling(Restless):
+    """It takes no command, and its toggle bit changes in every statusword."""
+
+    def _control(self, word: int, now: float) -> None:
+        pass
+
+    def _update_statusword(self) -> None:
+        super()._update_statusword()
+        self.values[0x6041, 0] |= (self._is_restless() and self.changes & 1) << 10
+
+
+class FallingBack(Restless):
+    """It falls back each time that it is switched on."""
+
+    def _enter(self, target: State, now: float) -> None:
+        falls = target in (State.SWITCHED_ON, State.OPERATION_ENABLED) and self._is_restless()
+        super()._enter(State.SWITCH_ON_DISABLED if falls else target, now)
+
+
+@pytest.mark.parametrize(("kind", "most"), [(Toggling, 1000), (FallingBack, 200)])
+def test_start_ends_though_a_drive_is_never_still(
+    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch, kind: type[Restless], most: int
+) -> None:
+    use(monkeypatch, kind)
+    monkeypatch.setattr(kind, "most", most)
+    config = drives_config(channel=str(hub.path), **QUICK)
+    rig = bench(config)
+    with pytest.raises(StateError, match="it stays in"):
+        move(config)
+    assert all(drive.changes < most for drive in rig._drives)  # type: ignore[attr-defined]
+
+
 def test_protections_of_the_other_drives_stay(hub: Hub, bench: Bench) -> None:
     """Waivers hold for all drives, but what a drive has is set nevertheless."""
     config = drives_config(channel=str(hub.path), **QUICK, waive=["1016", "6007", "605A"])

@@ -38,12 +38,19 @@ def rotation(**changes: Any) -> dict[str, Any]:
         (rotation(speed_limit=-1.0), "drives.rotation.speed_limit", "above 0"),
         (rotation(following_window=0.31), "drives.rotation.following_window", "at most"),
         (rotation(following_window=0.0), "drives.rotation.following_window", "above 0"),
+        (rotation(following_error=6.6), "drives.rotation.following_error", "the width of travel"),
         (rotation(unit="mm"), "drives.rotation.unit", "no such key"),
         ({"rotation": {"node": 2}}, "drives.rotation.counts_per_unit", "no default"),
         ({"cycle": 0.0105}, "drives.cycle", "whole milliseconds"),
         ({"cycle": 0.3}, "drives.cycle", "whole milliseconds"),
         ({"following_timeout": 0.0505}, "drives.following_timeout", "whole milliseconds"),
         ({"lag": 0.0}, "drives.lag", "above 0"),
+        ({"lag": 20}, "drives.lag", "at most 1"),
+        ({"command_timeout": 500}, "drives.command_timeout", "at most 60"),
+        ({"state_timeout": 1000}, "drives.state_timeout", "at most 60"),
+        ({"request_timeout": 300}, "drives.request_timeout", "at most 60"),
+        ({"following_timeout": 50}, "drives.following_timeout", "0.001 to 1.5"),
+        ({"heartbeat_timeout": 50}, "drives.heartbeat_timeout", "0.001 to 5"),
         ({"reply_timeout": 0.02}, "drives.reply_timeout", "less than cycle"),
         ({"heartbeat_timeout": 0.15}, "drives.heartbeat_timeout", "two heartbeats"),
         ({"waive": ["6040"]}, "drives.waive[0]", " or "),
@@ -142,6 +149,16 @@ def test_servos_have_defaults_in_units_of_the_dof() -> None:
             "1",
         ),  # type: ignore[operator]
         (
+            {"rotation": SERVO["rotation"] | {"torque_limit": 0}},
+            "drives.rotation.torque_limit",
+            "above 0",
+        ),  # type: ignore[operator]
+        (
+            {"rotation": SERVO["rotation"] | {"following_error": -1}},
+            "drives.rotation.following_error",
+            "above 0",
+        ),  # type: ignore[operator]
+        (
             {"insertion": {"node": 1, "model": "STS3215", "travel": [0, 1]}},
             "drives.insertion.counts_per_unit",
             "no default",
@@ -157,6 +174,15 @@ def test_error_names_the_invalid_field_of_servos(
         from_document({"drives": SERVO | changes})
     assert found.value.field == field
     assert message in found.value.allowed
+
+
+def test_a_watchdog_time_is_one_that_a_dynamixel_takes() -> None:
+    model = {"model": "XL330-M288"}
+    axes = {key: axis | model for key, axis in SERVO.items() if isinstance(axis, dict)}
+    document = axes | {"protocol": "dynamixel", "heartbeat_timeout": 2.54}
+    from_document({"drives": document})
+    with pytest.raises(ConfigError, match=r"drives\.heartbeat_timeout: got 2\.56"):
+        from_document({"drives": document | {"heartbeat_timeout": 2.56}})
 
 
 @pytest.mark.parametrize(

@@ -213,6 +213,39 @@ def test_motors_follow_and_stop(mode: int) -> None:
     assert master.state == INIT
 
 
+class Slowing(SimulatedDrive):
+    """A drive that slows down on a quick stop ramp, by 5 counts per cycle in each."""
+
+    speed = speed_at_the_end = 0
+
+    def on_sync(self, now: float) -> None:
+        before = self.demand
+        super().on_sync(now)
+        if self.status is State.OPERATION_ENABLED:
+            self.speed = self.demand - before
+        elif self.status is State.QUICK_STOP_ACTIVE:
+            self.speed -= min(max(self.speed, -5), 5)
+            self.demand += self.speed
+
+    def _enter(self, target: State, now: float) -> None:
+        if target is State.SWITCH_ON_DISABLED:
+            self.speed_at_the_end = self.speed
+        super()._enter(target, now)
+
+
+def test_voltage_stays_until_the_motors_have_slowed_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "SimulatedDrive", Slowing)
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        for _ in range(10):
+            drives.exchange(drives.last_command + np.array([0.0, 0.01, 0.0]))
+        rotation = master.slaves[Dof.ROTATION].drive
+        assert rotation.speed == -100
+        drives.disable()
+        assert states(master) == {State.SWITCH_ON_DISABLED}
+        assert rotation.speed_at_the_end == 0
+
+
 def running(soem: Any, config: DrivesConfig) -> Drives:
     drives = Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
     drives.start()
@@ -226,6 +259,36 @@ def test_fault_stops_all_drives() -> None:
         with pytest.raises(EmergencyError, match=r"rotation, device 2.*0x4310"):
             drives.exchange(drives.last_command)
         assert states(master) <= STOPPED_STATES
+
+
+def test_the_others_are_stopped_before_the_error_code_is_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        first, second = (slave.drive for slave in master.slaves[:2])
+        second.fail(0.0)
+        read, found = Slave.sdo_read, list[State]()
+
+        def sdo_read(slave: Slave, index: int, subindex: int) -> bytes:
+            found.append(first.status)
+            return read(slave, index, subindex)
+
+        monkeypatch.setattr(Slave, "sdo_read", sdo_read)
+        with pytest.raises(EmergencyError):
+            drives.exchange(drives.last_command)
+        assert found == [State.QUICK_STOP_ACTIVE]
+
+
+def test_faults_of_all_drives_are_reset_at_once() -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        for slave in master.slaves:
+            slave.drive.fail(0.0)
+        with pytest.raises(EmergencyError):
+            drives.exchange(drives.last_command)
+        drives.start(reset_faults=True)
+        assert states(master) == {State.OPERATION_ENABLED}
 
 
 def test_broken_line_stops_all_drives() -> None:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,14 @@ from tautscope.errors import (
     SignalError,
     StateError,
 )
-from tautscope.hardware.experiment import run_on_hardware
+from tautscope.hardware.experiment import _apply_reaction, run_on_hardware
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.timing import Timing, read_sent
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Rig
+from tautscope.loop.safety import Reaction
 from tautscope.runs.experiment import HELD_TIME
+from waiting import until
 
 
 @pytest.fixture
@@ -209,15 +212,48 @@ def test_missing_commands_end_in_quick_stop(setup: Callable[..., Setup]) -> None
         one.rig.step(start)
 
 
+def timed_out(one: Setup) -> None:
+    """Run until the motors are stopped for lack of commands."""
+    one.rig.step(one.rig.reset().applied)
+    until(lambda: bool(one.motors.stopped))
+
+
 def test_late_close_after_a_run_is_not_an_error(setup: Callable[..., Setup]) -> None:
     one = setup(drives={"command_timeout": 0.05})
-    one.rig.step(one.rig.reset().applied)
-    end = time.monotonic() + 60
-    while not one.motors.stopped and time.monotonic() < end:
-        time.sleep(CYCLE)
+    timed_out(one)
     one.rig.close()
     assert one.motors.stopped == 1
     assert one.rig.timing.lost == 0
+
+
+def test_late_close_is_an_error_if_the_quick_stop_was_not_confirmed(
+    setup: Callable[..., Setup],
+) -> None:
+    def stop() -> None:
+        raise StateError(
+            "rotation, node 2", "quick stop is not confirmed", "Use the emergency stop"
+        )
+
+    one = setup(drives={"command_timeout": 0.05})
+    one.motors.stop = stop  # type: ignore[method-assign]
+    timed_out(one)
+    with pytest.raises(StateError, match="rotation, node 2: quick stop is not confirmed"):
+        one.rig.close()
+
+
+def test_motors_that_were_stopped_before_are_not_said_to_be_without_power(
+    setup: Callable[..., Setup],
+) -> None:
+    one = setup(drives={"command_timeout": 0.05})
+    timed_out(one)
+    with pytest.raises(DriveError, match=r"loop: disable \(drive_fault\)") as found:
+        _apply_reaction(
+            one.rig,
+            SimpleNamespace(reaction=Reaction.DISABLE, flags=("drive_fault",)),  # type: ignore[arg-type]
+        )
+    assert one.motors.disabled == 0
+    assert "without power" not in str(found.value)
+    assert "voltage is not disabled" in str(found.value.__notes__)
 
 
 def test_rig_can_restart_after_close(setup: Callable[..., Setup]) -> None:

@@ -47,6 +47,15 @@ def test_a_second_master_is_refused_until_the_first_has_ended(bus: DrivesConfig)
         pass
 
 
+def test_other_users_can_lock_it_later_whatever_the_umask(bus: DrivesConfig) -> None:
+    mask = os.umask(0o077)
+    try:
+        with RigLock(bus):
+            assert lock_path(bus).stat().st_mode & 0o777 == 0o644
+    finally:
+        os.umask(mask)
+
+
 def test_another_bus_is_free(bus: DrivesConfig) -> None:
     other = load_config("bench").replace(**{"drives.channel": "/tmp/other"}).drives
     assert other is not None

@@ -184,14 +184,35 @@ def test_a_pause_of_the_computer_while_it_waits_for_answers_is_told(
 
 @FAMILIES
 def test_released_and_disabled_motors_have_no_torque(protocol: str, tmp_path: Path) -> None:
+    """It is switched off when they rest, and not on their way back to the last position read."""
     for changes, release in (({"after_quick_stop": "release"}, Drives.stop), ({}, Drives.disable)):
         with running(servos_config(protocol, tmp_path, **changes)) as (
             servos,
             drives,
         ):
             drive(drives, 3)
+            servo, goal = servos.servos[Dof.ROTATION], servos.servos[Dof.ROTATION].family.goal
+            servo.set(goal, servo.get(goal) + 20_000)
+            time.sleep(0.1)
             release(drives)
             assert not any(one.get(one.family.torque) for one in servos.servos)
+            assert abs(servo.get(servo.family.position) - servo.get(goal)) <= 1
+
+
+def test_a_stop_that_was_not_confirmed_is_repeated(tmp_path: Path) -> None:
+    with running(servos_config("feetech", tmp_path, state_timeout=0.3)) as (servos, drives):
+        servo, goal = servos.servos[Dof.ROTATION], servos.servos[Dof.ROTATION].family.goal
+        far = servo.get(goal) + 20_000
+        servo.set(goal, far)  # it is on its way
+        servos.inject("drop", Dof.ROTATION)
+        for _ in range(2):
+            with pytest.raises(StateError, match="rotation, servo 2: quick stop is not confirmed"):
+                drives.stop()
+        passed = servo.get(servo.family.position)
+        servos.clear(Dof.ROTATION)
+        until(lambda: not servos._faults[Dof.ROTATION])
+        drives.stop()
+        assert passed <= servo.get(goal) < far  # neither on nor back
 
 
 @FAMILIES

@@ -153,6 +153,23 @@ def test_watchdog_stops_the_motors_within_its_time(uno: SimulatedUno, tmp_path: 
     assert by_hand.ask(Request.READ).positions == stopped.positions
 
 
+@pytest.mark.parametrize("intervals", [(15, 1), (30, 1, 1), (70, 1, 1, 6)])
+def test_set_points_after_late_ones_are_no_burst(
+    uno: SimulatedUno, intervals: tuple[int, ...]
+) -> None:
+    """At 2 steps per ms, and 10 at most, there are 4 at most in any ms; requests take one each."""
+    by_hand = SimulatedLine(uno)
+    by_hand.ask(Request.ENABLE, (1000).to_bytes(2, "little"))
+    for number, interval in enumerate([8] * 20 + [*intervals] + [8] * 20):
+        target = 16 * min(number, 39)  # the last intervals are for rest
+        by_hand.ask(Request.SETPOINTS, frames.setpoints([target, 0, 0]))
+        for _ in range(interval - 1):
+            before = uno.c.board_steps()
+            uno.run(1e-3)
+            assert uno.c.board_steps() - before <= 4
+    assert by_hand.ask(Request.READ).positions[0] == target
+
+
 class SimulatedLine:
     """Requests by hand."""
 

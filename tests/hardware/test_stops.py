@@ -14,7 +14,8 @@ from tautscope.bench.servos import SimulatedServos
 from tautscope.cli import main
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
-from tautscope.errors import CalibrationError
+from tautscope.errors import CalibrationError, FollowingError
+from tautscope.hardware import stops as stops_module
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.stops import find_stops
 
@@ -100,3 +101,50 @@ def test_without_a_stop_or_with_other_stops_there_is_no_answer(tmp_path: Path) -
 
 def test_only_motors_with_limited_torque_are_driven_against_stops(tmp_path: Path) -> None:
     assert main(["calibrate", "stops", "insertion", "--config", "bench", "--yes"]) == 2
+
+
+class SoftStop:
+    """Drives whose motor of insertion rests at its lower stop, and the highest of its commands."""
+
+    cycle = 0.0
+
+    def __init__(self, node: str) -> None:
+        self.node, self.highest = node, LOWER
+
+    def __enter__(self) -> SoftStop:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        pass
+
+    def start(self) -> np.ndarray:
+        return np.array([LOWER, 0.0, 0.0])
+
+    def exchange(self, command: np.ndarray) -> np.ndarray:
+        self.highest = max(self.highest, command[0])
+        if not LOWER - 64 * COUNT < command[0] < UPPER:
+            raise FollowingError(self.node, "following error", "-")
+        return np.array([max(command[0], LOWER), *command[1:]])
+
+
+@pytest.mark.parametrize("give", [0, 3, 12])
+def test_a_motor_pressed_into_its_stop_is_not_driven_through_its_travel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, give: int
+) -> None:
+    """It rested some counts deeper in it than the search finds it, which moves by 1.4 per cycle."""
+    search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
+    drives = SoftStop("insertion, servo 1")
+    monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
+    begin = LOWER - give * COUNT
+    assert stops_module._seek_stop(search, Dof.INSERTION, -1, begin) == pytest.approx(LOWER)
+    assert drives.highest == LOWER
+
+
+def test_a_following_error_of_another_motor_is_no_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
+    drives = SoftStop("insertion_2, servo 4")
+    monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
+    with pytest.raises(FollowingError):
+        stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)

@@ -66,7 +66,7 @@ def _fill(motors: dict[str, Any], name: str, key: str, protocol: str) -> None:
         case [float() | int() as lower, float() | int() as upper] if lower < upper:
             filled = {"following_error": _FOLLOWING_SHARE * (upper - lower)} | filled
     match filled.get("following_error"):
-        case float() | int() as error:
+        case float() | int() as error if error > 0:
             filled = {"following_window": error / 2} | filled
     motors[name] = filled
 
@@ -83,10 +83,10 @@ def _of_servo(key: str, motor: dict[str, Any], protocol: str) -> dict[str, Any]:
     is_angle = motor.get("unit", "rad") == "rad" and key != Dof.INSERTION.key
     radian = {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)} if is_angle else {}
     counts = (radian | motor).get("counts_per_unit")
-    if not isinstance(counts, int | float) or counts <= 0:
+    if not isinstance(counts, int | float) or not counts > 0:
         return radian  # refused when it is checked
     torque = motor.get("torque_limit", 1.0)
-    if not isinstance(torque, int | float):
+    if not isinstance(torque, int | float) or not 0 < torque <= 1:
         return radian  # refused when it is checked
     turns = _SPEED_SHARE * torque * MODELS[model].speed / 60
     speed = turns * COUNTS_PER_TURN / counts

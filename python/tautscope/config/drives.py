@@ -34,6 +34,8 @@ WAIVERS: dict[Waiver, str] = {
 }
 """When each waiver is right; it completes "if ..." in messages."""
 
+Timeout = Annotated[float, Meta(gt=0, le=60)]
+"""Limited like all that limits depend on: milliseconds given for seconds would switch them off."""
 _OF_CIA_402 = (
     "interface",
     "options",
@@ -76,7 +78,7 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Largest speed [m/s or rad/s]; set and checked alike."""
     following_error: Positive
     """Largest distance of the motor from all commands of the last `lag` [m or rad]; by default 1 %
-    of the width of `travel`, of a servo 64 counts."""
+    of the width of `travel`, of a servo 64 counts; at most that width."""
     following_window: Positive
     """Largest distance that may last longer than `following_timeout` [m or rad]; by default half of
     `following_error`."""
@@ -130,7 +132,8 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     cycle: Positive = 0.01
     """Time from one set-point to the next [s], whole milliseconds."""
     reply_timeout: Positive = 0.006
-    """How long a cycle waits for the drives' answers; later ones are counted [s]."""
+    """How long a cycle waits for the drives' answers; later ones are counted, and their positions
+    not checked [s]."""
     lead_points: Annotated[int, Meta(ge=0, le=16)] = 2
     """Set-points in the drive's input buffer in mode 7; each adds a delay of one cycle and
     tolerates jitter of one."""
@@ -139,19 +142,21 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     heartbeat_period: Positive = 0.02
     """Period of all heartbeats [s], whole milliseconds."""
     heartbeat_timeout: Positive = 0.08
-    """Time without a heartbeat after which drives quick-stop [s], whole milliseconds; of servos,
-    without an answer or a set-point; watchdog time of a microcontroller, and of Dynamixel, rounded
-    up to 20 ms."""
-    state_timeout: Positive = 1.0
+    """Time without a heartbeat after which drives quick-stop [s], whole milliseconds, at most 5, of
+    Dynamixel 2.54; of servos, without an answer or a set-point; watchdog time of a microcontroller,
+    and of Dynamixel, rounded up to 20 ms. All are stopped too if answers of a motor are late for so
+    long."""
+    state_timeout: Timeout = 1.0
     """Timeout of each state transition [s]."""
-    request_timeout: Positive = 0.3
+    request_timeout: Timeout = 0.3
     """Timeout of each SDO response, or answer of a servo to a setting [s]."""
-    lag: Positive = 0.02
+    lag: Annotated[float, Meta(gt=0, le=1)] = 0.02
     """Largest delay of the motors [s]: filters and servo loops, late set-points; by default 0.06 of
     servos and microcontrollers."""
     following_timeout: Positive = 0.05
-    """How long the following error may exceed `following_window` [s], whole milliseconds."""
-    command_timeout: Positive = 0.5
+    """How long the following error may exceed `following_window` [s], whole milliseconds, at most
+    1.5."""
+    command_timeout: Timeout = 0.5
     """Time without a command, in which the motors are held, until their quick stop [s]."""
     start_speed: Fraction = 0.1
     """Fraction of `speed_limit` for the move to the start of a run."""
@@ -197,6 +202,12 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"less than 2^31 counts from home = {axis.home} to both ends of travel = "
                 f"{axis.travel}",
             )
+            require(
+                axis.following_error <= axis.travel[1] - axis.travel[0],
+                f"{path}.following_error",
+                axis.following_error,
+                f"at most the width of travel = {axis.travel}",
+            )
             require_at_most(path, axis, "following_window", "following_error")
             if self.protocol in PORTS:
                 allowed = "one of " + ", ".join(models_of(self.protocol))
@@ -224,9 +235,9 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             require(self.bitrate <= 1_000_000, "bitrate", self.bitrate, "at most 1000000 on CAN")
         for name, most in (
             ("cycle", 0.255),
-            ("heartbeat_period", 65.535),
-            ("heartbeat_timeout", 65.535),
-            ("following_timeout", 65.535),
+            ("heartbeat_period", 2.5),
+            ("heartbeat_timeout", 2.54 if self.protocol == "dynamixel" else 5.0),
+            ("following_timeout", 1.5),
         ):
             value = getattr(self, name)
             is_whole = math.isclose(value * 1e3, round(value * 1e3))

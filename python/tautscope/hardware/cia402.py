@@ -44,16 +44,7 @@ _STATUS = (
     (0x4F, 0x08, State.FAULT),
 )
 
-STOPPED_STATES = frozenset(
-    {
-        State.NOT_READY,
-        State.SWITCH_ON_DISABLED,
-        State.READY,
-        State.SWITCHED_ON,
-        State.QUICK_STOP_ACTIVE,
-        State.FAULT,
-    }
-)
+STOPPED_STATES = frozenset(State) - {State.OPERATION_ENABLED, State.FAULT_REACTION}
 """States in which a drive follows no set-points."""
 
 POWER_OFF_STATES = frozenset({State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT})

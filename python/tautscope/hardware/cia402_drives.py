@@ -138,9 +138,10 @@ class Cia402Drives(DriveGroup):
             SilentDriveError: A drive did not answer within `state_timeout`.
         """
         self._was_enabled = True
+        # Not those of an earlier run, which would enable drives that quick stop holds.
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
         if reset_faults:
             self._run_transition(self._reset_fault)
-        self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
         self._run_transition(self._enable)
         if Mode.INTERPOLATED_POSITION in self._modes.values():
             for _ in range(self._config.lead_points):
@@ -152,6 +153,7 @@ class Cia402Drives(DriveGroup):
         return self._command_until(cia402.QUICK_STOP, cia402.STOPPED_STATES)
 
     def _switch_off(self) -> list[str]:
+        self._await_rest(lambda: self._bus.broadcast(cia402.QUICK_STOP, self._targets))
         return self._command_until(cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES)
 
     def close(self) -> None:
@@ -197,8 +199,8 @@ class Cia402Drives(DriveGroup):
         time.sleep(max(0.0, self._config.cycle - (time.monotonic() - began)))
 
     def _run_transition(self, step: Callable[[Motor, State | None, Feedback], bool]) -> None:
-        """Cycle until `step` is true for every drive; each state has its own timeout."""
-        seen: list[int | None] = [None] * len(self._targets)
+        """Cycle until `step` is true for every drive; each new state has a timeout of its own."""
+        seen: list[set[State | None]] = [set() for _ in self._targets]
         since = [time.monotonic()] * len(self._targets)
         timeout = self._config.state_timeout
         while True:
@@ -207,10 +209,12 @@ class Cia402Drives(DriveGroup):
             for dof in self._config.all_motors:
                 feedback = self._feedback[dof]
                 has_answered = not feedback.age or bool(feedback.statusword)
-                is_done = has_answered and step(dof, cia402.state_of(feedback.statusword), feedback)
+                state = cia402.state_of(feedback.statusword)
+                is_done = has_answered and step(dof, state, feedback)
                 all_done = all_done and is_done
-                if is_done or feedback.statusword != seen[dof]:
-                    seen[dof], since[dof] = feedback.statusword, time.monotonic()
+                if is_done or state not in seen[dof]:
+                    seen[dof].add(state)
+                    since[dof] = time.monotonic()
                 elif time.monotonic() - since[dof] > timeout:
                     raise transition_error(self._bus.name(dof), feedback, self._modes[dof], timeout)
             if all_done:

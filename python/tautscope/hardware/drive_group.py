@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
-from tautscope.errors import StateError
+from tautscope.errors import DriveError, StateError
 from tautscope.hardware.cia402 import FOLLOWING_ERROR_BIT, Mode
+
+_RESTS = 3
+"""Cycles without motion that show rest; a drive may report one position twice."""
 
 
 @dataclass(slots=True)
@@ -93,8 +97,8 @@ class DriveGroup(ABC):
     def __init__(self, config: DrivesConfig) -> None:
         self._config = config
         self._feedback = [Feedback() for _ in config.all_motors]
-        self._sent_at = 0.0
-        self._is_moving = self._was_enabled = False
+        self._sent_at = self._stopped_at = 0.0
+        self._is_moving = self._was_enabled = self._is_unconfirmed = False
 
     @property
     def pending(self) -> int:
@@ -151,24 +155,28 @@ class DriveGroup(ABC):
     def exchange(self, targets: list[int]) -> list[Feedback]:
         """Send a set-point to each drive and wait for answers, no longer than `reply_timeout`."""
 
-    def quick_stop(self) -> list[str]:
+    def quick_stop(self, *, again: bool = False) -> list[str]:
         """Stop all motors; names of those that do not confirm it within `state_timeout`.
 
-        Does nothing if they never ran, or are stopped already.
+        Does nothing if they never ran or are stopped; `again` repeats a stop that is not confirmed.
         """
-        if not self._is_moving:
+        if not (self._is_moving or (again and self._is_unconfirmed)):
             return []
-        self._is_moving = False
-        return self._stop()
+        self._is_moving, self._stopped_at = False, time.monotonic()
+        unconfirmed = self._stop()
+        self._is_unconfirmed = bool(unconfirmed)
+        return unconfirmed
 
     def disable(self) -> list[str]:
-        """`quick_stop`, then switch the motors off; names of those that do not confirm it.
+        """`quick_stop`, then switch the motors off; names of those that do not confirm both.
 
         Switching off alone would let a moving motor coast. Does nothing if they never ran.
         """
         if not self._was_enabled:
             return []
-        return self.quick_stop() or self._switch_off()
+        unconfirmed = list(dict.fromkeys(self.quick_stop(again=True) + self._switch_off()))
+        self._is_unconfirmed = bool(unconfirmed)
+        return unconfirmed
 
     @abstractmethod
     def close(self) -> None:
@@ -182,6 +190,22 @@ class DriveGroup(ABC):
     def _switch_off(self) -> list[str]:
         """Switch all motors off; names of those that do not confirm it."""
 
+    def _await_rest(self, hold: Callable[[], list[Feedback]]) -> None:
+        """Call `hold` in each cycle until all motors rest, or `state_timeout` after their stop.
+
+        Switched off while it slows down, a motor would coast.
+        """
+        before, rests = [one.position for one in self._feedback], 0
+        deadline = self._stopped_at + self._config.state_timeout
+        while rests < _RESTS and time.monotonic() < deadline:
+            try:
+                feedback = hold()
+            except DriveError:
+                return  # the bus is lost
+            rests = rests + 1 if _are_at_rest(feedback, before) else 0
+            before = [one.position for one in feedback]
+            time.sleep(self._config.cycle)
+
     def _check_pause(self, name: str) -> None:
         """Note that a set-point is sent, unless the drives' watchdogs may have stopped them.
 
@@ -192,6 +216,12 @@ class DriveGroup(ABC):
         pause, self._sent_at = now - self._sent_at, now
         if pause > self._config.heartbeat_timeout:
             raise paused(name, self._config, pause)
+
+
+def _are_at_rest(feedback: list[Feedback], before: list[int]) -> bool:
+    """Whether all motors answer, from where they were in the cycle before."""
+    pairs = zip(feedback, before, strict=True)
+    return all(not one.age and abs(one.position - last) <= 1 for one, last in pairs)
 
 
 def paused(name: str, config: DrivesConfig, pause: float) -> StateError:

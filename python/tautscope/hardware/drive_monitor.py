@@ -62,6 +62,8 @@ class DriveMonitor:
         self._before: list[tuple[float, int]] = []
         """Position [m or rad] and age of each motor in the last cycle."""
         self._answers = [0] * len(self._scales)
+        self._late = [0] * len(self._scales)
+        """Cycles in a row that ended before the answer of each motor came: it is not checked."""
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
         self._last_cycle = 0.0
         self.statistics = self._no_cycles()
@@ -87,6 +89,7 @@ class DriveMonitor:
         self.statistics = self._no_cycles()
         start = self.positions(feedback)
         self._before = [(at, 0) for at in start]
+        self._late = [0] * len(start)
         self._following.reset(start)
         return start
 
@@ -103,13 +106,14 @@ class DriveMonitor:
         """Check one cycle; position actual values (n,) [m or rad].
 
         Raises:
-            SilentDriveError: A drive has not answered for `heartbeat_timeout`.
+            SilentDriveError: A drive has not answered in time for `heartbeat_timeout`.
             FollowingError: The following error is too large, or the position jumped.
         """
         self._count(feedback)
         positions, fresh = self.positions(feedback), [one.age == 0 for one in feedback]
         exceeded = self._following.update(command, positions, fresh)
         for dof in self._config.all_motors:
+            self._late[dof] = 0 if fresh[dof] else self._late[dof] + 1
             self._check_silence(dof, feedback[dof])
             if fresh[dof]:
                 self._check_position(dof, feedback[dof], positions[dof], bool(exceeded[dof]))
@@ -146,10 +150,12 @@ class DriveMonitor:
             self.statistics.lost[dof] = self.statistics.cycles - (one.answers - self._answers[dof])
 
     def _check_silence(self, dof: Motor, feedback: Feedback) -> None:
-        if feedback.silence > self._config.heartbeat_timeout:
+        # Late answers are as bad as none: no position is checked meanwhile.
+        silence = max(feedback.silence, self._late[dof] * self._config.cycle)
+        if silence > self._config.heartbeat_timeout:
             raise SilentDriveError(
                 self._names[dof],
-                f"no answer to {feedback.age} set-points, {feedback.silence * 1e3:.0f} ms",
+                f"no answer to {self._late[dof]} set-points in time, {silence * 1e3:.0f} ms",
                 "Check its supply, the bus, and the load of this computer",
             )
 

@@ -175,7 +175,7 @@ class Drives:
             SignalError: The command is not finite, leaves the travel or is too fast.
             StateError: A drive left operation enabled or its mode, or ignores set-points.
             FollowingError: The following error is too large.
-            SilentDriveError: A drive has not answered for `heartbeat_timeout`.
+            SilentDriveError: A drive has not answered in time for `heartbeat_timeout`.
             HeartbeatError: A drive's heartbeat is missing.
             EmergencyError: A drive sent an emergency object.
             SecondMasterError: Another master commands the drives.
@@ -217,16 +217,17 @@ class Drives:
     def stop(self) -> None:
         """Quick-stop all motors and wait for confirmation; the bus stays open.
 
-        Does nothing if they are stopped. Signals are deferred until it returns.
+        Does nothing if they are stopped; a stop that was not confirmed is repeated. Signals are
+        deferred until it returns.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
         """
         with defer_signals():
-            _require_confirmed(self._quick_stop())
+            _require_confirmed(self._quick_stop(again=True))
 
     def disable(self) -> None:
-        """`stop`, then disable voltage: nothing holds the motors any more.
+        """`stop`, wait for rest, and disable voltage: nothing holds the motors any more.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
@@ -273,10 +274,10 @@ class Drives:
         if note := self._monitor.pause_note:
             error.add_note(note)
 
-    def _quick_stop(self) -> list[str]:
+    def _quick_stop(self, *, again: bool = False) -> list[str]:
         """Quick-stop all drives; names of those that do not confirm it."""
         self._is_running = False
-        return self._group.quick_stop()
+        return self._group.quick_stop(again=again)
 
 
 def _as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:

@@ -119,6 +119,8 @@ class EthercatFieldbus(Fieldbus):
     def start(self) -> None:
         """Bring the line to operational; process data flows from here on."""
         self._answered_at, self._age = time.monotonic(), 0
+        for slave in self._slaves.values():
+            slave.is_enabled = False
         targets = [self._slaves[dof].tx_pdo[1] for dof in self._config.all_motors]
         self._exchange([cia402.DISABLE_VOLTAGE] * len(targets), targets)
         self._reach(self._soem.OP_STATE, "operational")
@@ -134,7 +136,8 @@ class EthercatFieldbus(Fieldbus):
         for dof, slave in self._slaves.items():
             state = cia402.state_of(slave.tx_pdo[0])
             if slave.is_enabled and state in (State.FAULT, State.FAULT_REACTION):
-                slave.is_enabled = False
+                # The mailbox may take most of a second, in which the others would move on.
+                self.broadcast(cia402.QUICK_STOP, targets)
                 code = self.read(dof, objects.ERROR_CODE)
                 raise EmergencyError(
                     slave.name,

@@ -126,14 +126,16 @@ def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
     if reaction.rank < Reaction.QUICK_STOP.rank:
         return
     is_disabled = reaction is Reaction.DISABLE
-    stop = DriveError(
-        "loop",
-        f"{reaction} ({', '.join(supervision.flags)})",
-        f"The motors are {'without power' if is_disabled else 'stopped'}. docs/safety.md explains "
-        "the flags; the log shows the cause",
-    )
+    done, notes = f"The motors are {'without power' if is_disabled else 'stopped'}. ", list[str]()
     try:
         rig.disable() if is_disabled else rig.close()
     except TautscopeError as error:
-        stop.add_note(str(error))
+        done, notes = "", [str(error), *getattr(error, "__notes__", ())]
+    stop = DriveError(
+        "loop",
+        f"{reaction} ({', '.join(supervision.flags)})",
+        f"{done}docs/safety.md explains the flags; the log shows the cause",
+    )
+    for note in notes:
+        stop.add_note(note)
     raise stop

@@ -186,8 +186,11 @@ class MotorRig:
     def disable(self) -> None:
         """Like `close`, and disable voltage: nothing holds the motors any more.
 
+        Does nothing if the rig is closed; the motors stay held.
+
         Raises:
-            StateError: A drive does not confirm; use the emergency stop.
+            StateError: A drive does not confirm; use the emergency stop. Or the motors were
+                stopped before, and stay held.
         """
         try:
             if self._setpoints is not None:

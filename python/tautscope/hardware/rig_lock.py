@@ -6,8 +6,8 @@ import hashlib
 import os
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from tautscope.config import DrivesConfig
@@ -54,12 +54,7 @@ class RigLock:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.release()
 
 
@@ -74,6 +69,9 @@ def _open(path: Path) -> int:
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW
     try:
         # Without O_CREAT, because Linux refuses it for another user's file in /tmp.
-        return os.open(path, flags)
+        file = os.open(path, flags)
     except FileNotFoundError:
-        return os.open(path, flags | os.O_CREAT, 0o644)
+        file = os.open(path, flags | os.O_CREAT, 0o644)
+    with suppress(PermissionError):  # another user's
+        os.fchmod(file, 0o644)  # for other users, whatever the umask
+    return file

@@ -52,7 +52,7 @@ class SetpointThread:
         self._command: Floats | None = None
         self._sent: tuple[float, Floats] | None = None
         self._has_begun = self._is_stopping = self._is_over = self._is_reported = False
-        self._has_timed_out = self._is_disabling = False
+        self._has_timed_out = self._is_disabling = self._is_disabled = False
         self._failure: BaseException | None = None
         self._due = 0.0
         self._command_wait = _COMMAND_WAIT * config.cycle
@@ -97,7 +97,9 @@ class SetpointThread:
             disable: Disable voltage too.
 
         Raises:
-            TautscopeError: The thread failed, and the failure was not raised before.
+            TautscopeError: The thread failed, and the failure was not raised before; no command for
+                ``command_timeout`` is none, if the quick stop was confirmed.
+            StateError: The motors were stopped before, without disabling voltage.
         """
         with self._condition:
             self._is_stopping, self._is_disabling = True, disable
@@ -105,6 +107,12 @@ class SetpointThread:
             self._thread.join()
         if not (self._is_reported or self._has_timed_out):
             self._raise_failure()
+        if disable and self._thread.ident is not None and not self._is_disabled:
+            raise StateError(
+                "drives",
+                "they were stopped before, and may hold the motors: voltage is not disabled",
+                "Switch their supply off",
+            )
 
     def _wait_for_answer(self) -> tuple[float, Floats]:
         self._condition.wait_for(lambda: self._sent is not None or self._is_over)
@@ -127,6 +135,7 @@ class SetpointThread:
                 self._stream(motors)
                 if self._is_disabling:
                     motors.disable()
+                    self._is_disabled = True
         except BaseException as error:
             failure = error
         with self._condition:
@@ -173,6 +182,7 @@ class SetpointThread:
             if new is not None:
                 command, last_command_at, self._has_begun = new, began, True
             elif began - last_command_at > self._config.command_timeout:
+                motors.stop()  # an error of its own if it is not confirmed
                 self._has_timed_out = True
                 raise StateError(
                     "loop",

@@ -108,11 +108,12 @@ def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -
                 command[dof] += step
                 at = float(_paced(drives, command)[dof])
     except FollowingError as error:
-        if not error.node.startswith(dof.label):
+        if not error.node.startswith(f"{dof.label},"):
             raise
         with open_drives(config) as drives:
             command = drives.start()
-            while abs(begin - command[dof]) > abs(step):
+            # By sign: at rest it may have been pressed deeper into the stop than the search goes.
+            while direction * (command[dof] - begin) > abs(step):
                 command[dof] -= step
                 _paced(drives, command)
         return at

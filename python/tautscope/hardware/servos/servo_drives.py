@@ -9,6 +9,7 @@ families only Dynamixel stops by itself when packets are missing (bus watchdog,
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
@@ -109,6 +110,9 @@ class ServoDrives(DriveGroup):
 
     def _stop(self) -> list[str]:
         """Hold each motor where it was in the last cycle, or release it, as `after_quick_stop`."""
+        if self._is_unconfirmed:  # they may have gone on since the first attempt
+            with suppress(DriveError):
+                self._receive()
         unconfirmed = self._command_until(
             self._family.goal, [one.position for one in self._feedback]
         )
@@ -117,6 +121,7 @@ class ServoDrives(DriveGroup):
         return unconfirmed
 
     def _switch_off(self) -> list[str]:
+        self._await_rest(self.probe)
         return self._command_until(self._family.torque, [0] * len(self._servos))
 
     def close(self) -> None:
