@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import own_catheter
 import pytest
+import tautscope
 from running import Arm, Page, RunningConsole, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
@@ -19,7 +21,11 @@ from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Received, Servo, decode_state
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
+from tautscope.console.rig_control import INTERRUPTED, RigControl
+from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
+from tautscope.console.state import LogState
+from tautscope.errors import StateError
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
@@ -114,6 +120,58 @@ def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
         tick = by_time[state["time"]]
         assert np.allclose(state["command"], tick.command)
         assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
+
+
+class Slow(Arm):
+    """Its reset moves until it is interrupted, or for as long as `duration` [s]."""
+
+    duration, is_interrupted = 20.0, False
+
+    def reset(self) -> Sample:
+        end = time.monotonic() + self.duration
+        while time.monotonic() < end and not self.is_interrupted:
+            time.sleep(0.001)
+        if self.is_interrupted:
+            raise StateError("rig", "interrupted", "Call reset() to start again")
+        return super().reset()
+
+
+class Interrupted(Slow):
+    def interrupt(self) -> None:
+        self.is_interrupted = True
+
+
+@pytest.mark.parametrize("cause", ["STOP by page 2", "The page was away"])
+@pytest.mark.parametrize("kind", [Interrupted, Slow])
+def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[Slow], cause: str
+) -> None:
+    arm, states = kind(2), []
+    monkeypatch.setattr(Slow, "duration", 0.5 if kind is Slow else 20.0)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(tautscope.axes(2, width_limit=1.0), rig, tmp_path, executor)
+        monkeypatch.setattr(control.operator, "is_present", lambda now: not states)
+
+        def look() -> None:
+            states.append(session_state(control, LogState(), time.monotonic()))
+            if cause.startswith("STOP") and len(states) == 2:
+                control.stop(cause)
+
+        if cause.startswith("STOP"):
+            monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+        control.while_opening = look
+        control.open()
+        assert arm.is_interrupted == (kind is Interrupted)
+        assert control.run is None
+        assert control.fault == INTERRUPTED
+        assert (states[0].motion, states[0].drives) == ("opening", "being enabled")
+        if kind is Slow:
+            assert states[-1].motion == "stopped"
+            assert states[-1].message == (
+                f"{cause}. The rig's reset has not ended: use the emergency stop."
+            )
+        control.shut_down()
 
 
 def broken(*_: object) -> Sample:

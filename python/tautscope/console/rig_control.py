@@ -22,12 +22,10 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
-from tautscope.loop.rig import Rig, Sample, check_sample
+from tautscope.loop.rig import Rig, Sample, check_sample, reset_unless
 
 _LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
-_IDLE_PERIOD = 0.005
-"""Time between two calls of `while_opening` [s]."""
 
 
 class RigControl:
@@ -47,6 +45,7 @@ class RigControl:
         run: The present run; None while the rig is off.
         fault: Why the rig is off; empty if it is not, or was never on.
         is_opening: Whether the drives are being enabled.
+        is_interrupted: Whether this has to end, or had to: by STOP, or without a page.
         stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
         compensation: Share of the compensation that the operator has chosen.
         is_recording: Whether a take is being recorded, with lossless images.
@@ -62,7 +61,7 @@ class RigControl:
         self.operator = OperatorInput(config, self.lease)
         self.run: ControlRun | None = None
         self.fault = ""
-        self.is_opening = self.is_recording = False
+        self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
@@ -71,7 +70,6 @@ class RigControl:
         if isinstance(rig, HardwareRig):
             rig.warn = self._warn
         self._runs = 0
-        self._was_interrupted = False
         self._endings: list[threading.Thread] = []
 
     @property
@@ -82,21 +80,14 @@ class RigControl:
 
     def open(self) -> None:
         """Enable the rig and start a run; a STOP, or a page that is gone, interrupts it."""
-        self.fault, self.is_opening, self._was_interrupted = "", True, False
-        watching = threading.Thread(target=self._watch_opening, name="opening")
-        watching.start()
+        self.fault, self.is_opening, self.is_interrupted = "", True, False
         try:
-            sample = check_sample(self._rig.reset(), self.config)
+            sample = check_sample(reset_unless(self._rig, self._must_stop), self.config)
         except TautscopeError as error:
-            self.fault = str(error)
+            self._stop_motors(INTERRUPTED if self.is_interrupted else str(error))
+            return
         finally:
             self.is_opening = False
-            watching.join()
-        if self._was_interrupted:
-            self.fault = INTERRUPTED
-        if self.fault:
-            self._stop_motors(self.fault)
-            return
         self.operator.reset(np.array(sample.applied, np.float64))
         self._start_run(sample)
 
@@ -188,13 +179,10 @@ class RigControl:
         self._endings.append(thread)
         thread.start()
 
-    def _watch_opening(self) -> None:
-        while self.is_opening:
-            self.while_opening()
-            operator = self.operator
-            is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
-            if self.is_hardware and not is_wanted:
-                self._was_interrupted = True
-                if isinstance(self._rig, HardwareRig):
-                    self._rig.interrupt()
-            time.sleep(_IDLE_PERIOD)
+    def _must_stop(self) -> bool:
+        """Whether the motors, which are being enabled, have to stop."""
+        self.while_opening()
+        operator = self.operator
+        is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
+        self.is_interrupted |= self.is_hardware and not is_wanted
+        return self.is_interrupted

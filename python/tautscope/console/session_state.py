@@ -83,7 +83,11 @@ def _add_run(state: State, run: ControlRun) -> None:
 def _motion(control: RigControl) -> tuple[str, str]:
     """The kind of motion, and what is in force and why, in one line."""
     operator, run = control.operator, control.run
-    if control.is_opening:
+    if control.is_opening and control.is_interrupted:
+        reason = operator.stopped_by or "The page was away"
+        unended = "The rig's reset has not ended: use the emergency stop."
+        found = "stopped", f"{reason}. {unended}"
+    elif control.is_opening:
         found = "opening", "The motors are being enabled and move to the start position."
     elif operator.stopped_by:
         found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
@@ -117,4 +121,6 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
 def _drives(control: RigControl) -> str:
     if not control.is_hardware:
         return "simulated"
+    if control.is_opening:
+        return "being enabled"
     return "enabled" if control.run is not None else "stopped, or off"

@@ -20,7 +20,7 @@ from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
-from tautscope.loop.rig import Frame, Rig
+from tautscope.loop.rig import Frame, Rig, reset_unless
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
@@ -225,11 +225,9 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
-        if isinstance(rig, HardwareRig):
-            sample = rig.reset_unless(self._is_stopped)
-            monitor = partial(PlausibilityMonitor, self._config)
-        else:
-            sample, monitor = rig.reset(), None
+        sample = reset_unless(rig, self._is_stopped)
+        is_article = isinstance(rig, HardwareRig)
+        monitor = partial(PlausibilityMonitor, self._config) if is_article else None
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
