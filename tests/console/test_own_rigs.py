@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import re
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +15,7 @@ import numpy as np
 import own_catheter
 import pytest
 import tautscope
+from numpy.typing import ArrayLike
 from running import Arm, Page, RunningConsole, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
@@ -22,6 +24,7 @@ from tautscope.console.messages import Received, Servo, decode_state
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
 from tautscope.console.rig_control import INTERRUPTED, RigControl
+from tautscope.console.session import Session
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.state import LogState
@@ -172,6 +175,61 @@ def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
                 f"{cause}. The rig's reset has not ended: use the emergency stop."
             )
         control.shut_down()
+
+
+class Unconfirmed(Arm):
+    """Its drives do not confirm a stop: `close` says so, or a note of the error of `step`."""
+
+    close_error = step_error = None
+
+    def step(self, command: ArrayLike) -> Sample:
+        if self.step_error is not None:
+            raise self.step_error
+        return super().step(command)
+
+    def close(self) -> None:
+        if self.close_error is not None:
+            raise self.close_error
+
+
+@pytest.mark.parametrize("where", ["close", "step"])
+def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    arm, config = Unconfirmed(2), tautscope.axes(2, width_limit=1.0)
+    note = "bend_x: quick stop is not confirmed. Use the emergency stop: the motor may be moving"
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(config, rig, tmp_path, executor)
+        session = Session(control, Channels(memory))
+        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+
+        def shown() -> tuple[str, str, str]:
+            state = session_state(control, LogState(), time.monotonic())
+            return state.motion, state.message, state.drives
+
+        control.open()
+        assert shown()[2] == "enabled"
+        if where == "close":
+            arm.close_error = StateError(*re.split(r"[:.] ", note, maxsplit=2))
+            control.stop("STOP by page 1")
+        else:
+            arm.step_error = StateError("bend_y", "fault 12", "See the manual")
+            arm.step_error.add_note(note)
+            session._tick(control.run)
+        assert control.run is None
+        motion, message, drives = shown()
+        assert motion == "unconfirmed"
+        assert message.startswith("THE MOTORS MAY STILL MOVE: ")
+        assert note in message
+        assert drives == "THE MOTORS MAY STILL MOVE"
+        arm.close_error = arm.step_error = None
+        control.operator.enable()
+        control.open()
+        assert shown()[::2] == ("ready", "enabled")
+        control.shut_down()
+        session._publisher.close()
 
 
 def broken(*_: object) -> Sample:

@@ -68,3 +68,23 @@ def test_a_stop_while_a_rig_resets_is_not_forgotten(
         assert both.control.operating_state == "FAULT"
         assert arm.is_closed
         assert arm.is_interrupted == (kind is Interrupted)
+
+
+def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm, config = Arm(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        both.enable(np.zeros(2))
+        error = StateError("bend_y", "fault 12", "See the manual")
+        error.add_note("bend_x: quick stop is not confirmed")
+
+        def broken(command: ArrayLike) -> Sample:
+            raise error
+
+        monkeypatch.setattr(arm, "step", broken)
+        both.tick()
+        assert both.control.fault.endswith("; bend_x: quick stop is not confirmed")
+        assert both.control.fault in [each.data for each in both.drain(both.warnings)]

@@ -17,7 +17,7 @@ from tautscope.console.control_run import ControlRun
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
-from tautscope.errors import TautscopeError
+from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
@@ -44,6 +44,7 @@ class RigControl:
         operator: The source of the reference.
         run: The present run; None while the rig is off.
         fault: Why the rig is off; empty if it is not, or was never on.
+        unconfirmed: Why the motors may still move although they were stopped; empty if they do not.
         is_opening: Whether the drives are being enabled.
         is_interrupted: Whether this has to end, or had to: by STOP, or without a page.
         stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
@@ -60,7 +61,7 @@ class RigControl:
         self.lease = Lease(self.images)
         self.operator = OperatorInput(config, self.lease)
         self.run: ControlRun | None = None
-        self.fault = ""
+        self.fault = self.unconfirmed = ""
         self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
         self.compensation = 1.0
@@ -84,10 +85,14 @@ class RigControl:
         try:
             sample = check_sample(reset_unless(self._rig, self._must_stop), self.config)
         except TautscopeError as error:
-            self._stop_motors(INTERRUPTED if self.is_interrupted else str(error))
+            found = described(error)
+            if self.is_interrupted and EMERGENCY_STOP not in found:
+                found = INTERRUPTED
+            self._stop_motors(found)
             return
         finally:
             self.is_opening = False
+        self.unconfirmed = ""
         self.operator.reset(np.array(sample.applied, np.float64))
         self._start_run(sample)
 
@@ -146,7 +151,10 @@ class RigControl:
             elif self.is_hardware:
                 self._rig.close()
         except TautscopeError as error:
-            self.fault = f"{fault}; {error}" if fault else str(error)
+            self.unconfirmed = described(error)
+            self.fault = f"{fault}; {self.unconfirmed}" if fault else self.unconfirmed
+        if EMERGENCY_STOP in fault:
+            self.unconfirmed = fault
 
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1

@@ -24,6 +24,7 @@ _EFFECTS = {
     Reaction.QUICK_STOP: "Quick stop",
     Reaction.DISABLE: "The motors are disabled",
 }
+_MAY_MOVE = "THE MOTORS MAY STILL MOVE"
 
 
 def session_state(control: RigControl, log: LogState, now: float) -> State:
@@ -89,6 +90,8 @@ def _motion(control: RigControl) -> tuple[str, str]:
         found = "stopped", f"{reason}. {unended}"
     elif control.is_opening:
         found = "opening", "The motors are being enabled and move to the start position."
+    elif control.unconfirmed:
+        found = "unconfirmed", f"{_MAY_MOVE}: {control.unconfirmed}"
     elif operator.stopped_by:
         found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
     elif run is not None:
@@ -123,4 +126,6 @@ def _drives(control: RigControl) -> str:
         return "simulated"
     if control.is_opening:
         return "being enabled"
+    if control.unconfirmed:
+        return _MAY_MOVE
     return "enabled" if control.run is not None else "stopped, or off"

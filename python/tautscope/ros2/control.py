@@ -14,7 +14,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
-from tautscope.errors import ConfigError, MessageError, TautscopeError
+from tautscope.errors import ConfigError, MessageError, TautscopeError, described
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
@@ -139,7 +139,7 @@ class NodeControl:
             run.step()
             self._add_measurements(run)
         except TautscopeError as error:
-            self._fail(str(error))
+            self._fail(described(error))
 
     @property
     def operating_state(self) -> OperatingState:
@@ -201,9 +201,9 @@ class NodeControl:
                 if transition.goal in (State.UNCONFIGURED, State.FINALIZED):
                     self._release_rig()
         except TautscopeError as error:
-            self.fault, self._states.goal = str(error), OperatingState.FAULT
-            _LOG.warning("%s", error)
-            self._telemetry.warn(str(error))
+            self.fault, self._states.goal = described(error), OperatingState.FAULT
+            _LOG.warning("%s", self.fault)
+            self._telemetry.warn(self.fault)
             if transition is ACTIVATE and self._rig is not None:
                 self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.

@@ -11,9 +11,10 @@ import { Steering, isText } from "./steer.js";
 const LOST = 500; // ms without a state, or without an image
 const MODES = { twin: "SIMULATED", hardware: "REAL MOTORS", replay: "RECORDING" };
 const WORDS = {
-  ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", off: "OFF", opening: "ENABLING", lost: "NO DATA",
-  replay: "REPLAY",
+  ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", unconfirmed: "MAY MOVE", off: "OFF",
+  opening: "ENABLING", lost: "NO DATA", replay: "REPLAY",
 };
+const RESTING = ["stopped", "unconfirmed", "held", "off"]; // until Enable
 
 const $ = (id) => document.getElementById(id);
 document.body.classList.toggle("viewing", new URLSearchParams(location.search).has("view"));
@@ -223,14 +224,14 @@ function showControls() {
   $("score").textContent = state.score.some(Boolean)
     ? `Last minute: ${shares} less error than without (by ${state.uncompensated_by}).`
     : "Move for a second to compare with the tip without compensation.";
-  $("enable").disabled ||= !["stopped", "held", "off"].includes(state.motion);
+  $("enable").disabled ||= !RESTING.includes(state.motion);
   $("hint").textContent = hint();
 }
 
 function hint() {
   if (!hasLease()) return "Take control to steer. Others watch; everybody may stop.";
   if (!steering.isActive) return "This page does not have the focus: nothing moves.";
-  if (["stopped", "held", "off"].includes(state.motion)) return "Press Enable; then hold a key to move.";
+  if (RESTING.includes(state.motion)) return "Press Enable; then hold a key to move.";
   if (state.rested_by) return `Motion ended: ${state.rested_by}. Let go, then hold again.`;
   if (state.is_off_centre) return "A stick of the gamepad is off centre: let go of it. If it stays, unplug the gamepad: it is worn.";
   if (isText(document.activeElement)) return "Keys write into the text field; click beside it to steer by them.";
@@ -260,7 +261,7 @@ function update() {
   const now = isLost ? "lost" : state.motion;
   if (now !== motion) {
     if (now === "lost") sound.play("lost");
-    if (["stopped", "held", "off"].includes(now)) sound.play("stopped");
+    if (RESTING.includes(now)) sound.play("stopped");
     motion = document.body.dataset.motion = now;
     $("motion").textContent = WORDS[now];
   }
