@@ -57,6 +57,9 @@ class Actions:
         reason = control.lease.refusal(
             client, message, time.monotonic(), needs_image=what in PROGRAMS
         )
+        if not reason and what == "enable" and inbound.at <= control.ended_at:
+            # It waited, at a link that stood or while the rig opened, and must not undo the stop.
+            reason = "motion was stopped after it, press Enable again"
         if reason:
             control.operator.refused[reason] += 1
         else:

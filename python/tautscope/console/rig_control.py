@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -48,6 +49,7 @@ class RigControl:
         is_opening: Whether the drives are being enabled.
         is_interrupted: Whether this has to end, or had to: by STOP, or without a page.
         stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
+        ended_at: When motion was last stopped, or the rig went off [s, monotonic clock].
         compensation: Share of the compensation that the operator has chosen.
         is_recording: Whether a take is being recorded, with lossless images.
         while_opening: Called periodically, in another thread, while the rig opens: this takes
@@ -64,6 +66,7 @@ class RigControl:
         self.fault = self.unconfirmed = ""
         self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
+        self.ended_at = -math.inf
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
         self.kinematics = build_kinematics(config) if config.dof else None
@@ -119,7 +122,7 @@ class RigControl:
     def stop(self, reason: str) -> None:
         """Stop motion until it is enabled; motors are quick-stopped."""
         self.operator.stop(reason)
-        self.stopped_at = time.monotonic()
+        self.stopped_at = self.ended_at = time.monotonic()
         if self.run is not None:
             self.run.note(reason)
             if self.is_hardware:
@@ -155,6 +158,7 @@ class RigControl:
             self.fault = f"{fault}; {self.unconfirmed}" if fault else self.unconfirmed
         if EMERGENCY_STOP in fault:
             self.unconfirmed = fault
+        self.ended_at = time.monotonic()
 
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
