@@ -25,6 +25,11 @@ class Laboratory:
         self.node = InstrumentNode()
         assert self.node.on_configure(None) == "success"
         assert self.node.on_activate(None) == "success"
+        self.measure(START)
+
+    def measure(self, position):
+        message = stamped(self.node.now, name=JOINTS, position=list(position))
+        self.node.callbacks["actuators/measured_js"](message)
 
     def run(self, duration, speed=None):
         """Timers of the node, with a reference in every tick if it has a speed [m/s]."""
@@ -106,6 +111,18 @@ def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
     assert any("reference_late" in text for text in laboratory.warnings())
 
 
+def test_enable_is_refused_with_a_warning_while_the_drives_are_silent(laboratory):
+    laboratory.node.on_cleanup(None)
+    laboratory.node.on_configure(None)
+    laboratory.node.on_activate(None)
+    laboratory.request("enable")
+    laboratory.run(0.2, speed=0.01)
+    assert laboratory.node.published["actuators/setpoint_js"] == []
+    assert laboratory.states()[-1] == "DISABLED"
+    assert laboratory.warnings()[-1] == "enable is refused: it is not known where the drives are"
+    assert laboratory.node.published["/diagnostics"][-1].status[0].level == doubles.Message.ERROR
+
+
 def test_an_old_reference_stops_the_motion_though_it_arrives_now(laboratory):
     laboratory.request("enable")
     laboratory.run(0.5, speed=0.01)
@@ -160,6 +177,7 @@ def test_a_fault_of_the_drives_stops_them_until_it_is_cleared(laboratory):
     stops = laboratory.texts("actuators/state_command")
     assert set(stops) == {"pause"}
     assert 5 <= len(stops) <= 7
+    laboratory.measure(laboratory.node.published["actuators/setpoint_js"][-1].position)
     laboratory.request("enable")
     laboratory.run(0.1, speed=0.01)
     assert len(laboratory.node.published["actuators/setpoint_js"]) > sent
@@ -226,6 +244,8 @@ class TestAnotherRobot:
         node = InstrumentNode()
         assert node.on_configure(None) == "success"
         assert node.on_activate(None) == "success"
+        drives = stamped(node.now, name=list(self.JOINTS), position=[0.0, 0.0])
+        node.callbacks["actuators/measured_js"](drives)
         return node
 
     def tick(self, node, reference=None):

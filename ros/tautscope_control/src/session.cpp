@@ -30,9 +30,14 @@ std_msgs::msg::MultiArrayDimension dimension(const std::string &label, std::uint
     return dimension;
 }
 
+bool is_refused(const Status &status) { return status.is_misplaced || status.is_unmeasured; }
+
 std::string description(const Status &status) {
     if (status.is_misplaced) {
         return "the drives are not where the last command was: clean up and configure again";
+    }
+    if (status.is_unmeasured) {
+        return "enable is refused: it is not known where the drives are";
     }
     return std::string(tautscope_reaction_name(status.reaction)) + ": " + flag_names(status.flags | status.latched);
 }
@@ -197,8 +202,8 @@ void Session::report() {
     if (has_changed || reports_ % reports_per_second == 0) {
         publish_state(status, now);
     }
-    const bool has_warning = status.is_misplaced || status.latched != 0 || status.flags != 0;
-    if (has_warning && (status.flags != last_.flags || status.latched != last_.latched || status.is_misplaced != last_.is_misplaced)) {
+    const bool has_warning = is_refused(status) || status.latched != 0 || status.flags != 0;
+    if (has_warning && (status.flags != last_.flags || status.latched != last_.latched || is_refused(status) != is_refused(last_))) {
         std_msgs::msg::String warning;
         warning.data = description(status);
         warning_->publish(warning);
@@ -229,8 +234,8 @@ void Session::publish_diagnostics(const Status &status, const rclcpp::Time &now)
     Level about;
     about.name = name_ + ": hysteresis reduction";
     about.hardware_id = frame_id_;
-    about.message = status.flags == 0 && !status.is_misplaced ? name(status.state) : description(status);
-    about.level = status.is_misplaced || status.reaction >= TAUTSCOPE_REACTION_HOLD_MOTION ? Level::ERROR
+    about.message = status.flags == 0 && !is_refused(status) ? name(status.state) : description(status);
+    about.level = is_refused(status) || status.reaction >= TAUTSCOPE_REACTION_HOLD_MOTION ? Level::ERROR
                   : status.flags != 0 || status.latched != 0                               ? Level::WARN
                                                                                           : Level::OK;
     const ImageCounts counts = worker_ ? worker_->counts() : counts_;

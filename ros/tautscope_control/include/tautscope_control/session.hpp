@@ -82,7 +82,7 @@ private:
     rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
     /// When an image was last used [s].
     std::atomic<double> measured_at_{-1.0};
-    Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false};
+    Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false, false};
     int reports_ = 0;
     /// Of images the worker counts.
     ImageCounts counts_{0, 0, 0, 0};
