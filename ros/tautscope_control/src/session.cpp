@@ -124,8 +124,7 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefi
         node.get_parameter("image_topic").as_string(), rclcpp::SensorDataQoS().keep_last(1),
         [worker = std::weak_ptr<DetectionWorker>(worker_), origin = origin_, logger = logger_,
          clock = clock_](sensor_msgs::msg::Image::ConstSharedPtr message) {
-            const rclcpp::Time stamp(message->header.stamp, origin.get_clock_type());
-            const double captured_at = 1e-9 * static_cast<double>((stamp - origin).nanoseconds());
+            const double captured_at = 1e-9 * static_cast<double>(nanoseconds(message->header.stamp) - origin.nanoseconds());
             auto received = image(message, captured_at);
             if (!received) {
                 RCLCPP_ERROR_THROTTLE(logger, *clock, 1000, "Image not used: encoding %s", message->encoding.c_str());
@@ -144,9 +143,8 @@ Session::~Session() {
 }
 
 double Session::seconds(const builtin_interfaces::msg::Time &stamp) const {
-    const rclcpp::Time now = clock_->now();
-    const rclcpp::Time time(stamp, now.get_clock_type());
-    return seconds(time.nanoseconds() == 0 ? now : std::min(time, now));
+    const std::int64_t now = clock_->now().nanoseconds(), time = nanoseconds(stamp);
+    return seconds(time == 0 ? now : std::min(time, now));
 }
 
 sensor_msgs::msg::JointState Session::joint_state() const {
@@ -181,7 +179,7 @@ template <class Report> void Session::on_report(const Report &report) {
 void Session::on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor) {
     publish_reports();
     const Values values = positions(message, control_.dofs());
-    const double captured_at = seconds(rclcpp::Time(message.header.stamp, origin_.get_clock_type()));
+    const double captured_at = seconds(nanoseconds(message.header.stamp));
     const bool is_known = std::any_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
     ++counts_.arrived;
     counts_.refused += is_known && control_.detection().measurements.push({values, captured_at, sensor}) ? 0 : 1;
@@ -212,7 +210,7 @@ void Session::report() {
     if (has_changed || reports_ % reports_per_second == 0) {
         publish_diagnostics(status, now);
     }
-    if (seconds(now) - measured_at_ > measured_timeout) {
+    if (seconds(now.nanoseconds()) - measured_at_ > measured_timeout) {
         measured_->publish(joint_state());
     }
     last_ = status;
