@@ -19,8 +19,16 @@ from numpy.typing import ArrayLike
 from running import Arm, Page, RunningConsole, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
+from tautscope.console.actions import Actions
 from tautscope.console.lease import ImageTimes, Lease
-from tautscope.console.messages import Received, Servo, decode_state
+from tautscope.console.messages import (
+    Action,
+    Received,
+    Reply,
+    Servo,
+    SetProfile,
+    decode_state,
+)
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
 from tautscope.console.rig_control import INTERRUPTED, RigControl
@@ -228,6 +236,50 @@ def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
         control.operator.enable()
         control.open()
         assert shown()[::2] == ("ready", "enabled")
+        control.shut_down()
+        session._publisher.close()
+
+
+@pytest.mark.parametrize("is_simulated", [True, False])
+def test_neither_a_hold_nor_a_warning_ends_with_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_simulated: bool
+) -> None:
+    config = tautscope.axes(2, width_limit=1.0)
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: Arm(2), 0.005, is_simulated=is_simulated)
+        control = RigControl(config, rig, tmp_path, executor)
+        session, actions = Session(control, Channels(memory)), Actions(control, lambda: None)
+        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+
+        def shown() -> tuple[str, list[str]]:
+            state = session_state(control, LogState(), time.monotonic())
+            return state.motion, [name for name, _ in state.latched]
+
+        def execute(number: int, **fields: str) -> Reply | None:
+            kind = SetProfile if "profile" in fields else Action
+            message = kind(control.lease.number, number, 0, **fields)
+            return actions.execute(Received(1, time.monotonic(), message))
+
+        control.lease.take(1)
+        control.open()
+        session._tick(control.run)
+        control.run.loop.raise_flag("reference_jump")
+        session._tick(control.run)
+        reply = execute(1, profile="paper")
+        assert (reply.is_accepted, reply.reason) == (False, "motion is held, press Enable first")
+        assert shown() == ("held", ["reference_jump"])
+        execute(2, name="enable")
+        session._tick(control.run)
+        if is_simulated:
+            assert execute(3, profile="paper").is_accepted
+            assert shown() == ("ready", ["reference_jump"])
+        else:
+            control.run.loop.raise_flag("drive_fault")
+            session._tick(control.run)
+            assert shown() == ("off", ["drive_fault", "reference_jump"])
+        assert execute(4, name="acknowledge").is_accepted
+        assert shown()[1] == []
         control.shut_down()
         session._publisher.close()
 

@@ -67,6 +67,7 @@ class RigControl:
         self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
         self.ended_at = -math.inf
+        self._warnings: set[str] = set()
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
         self.kinematics = build_kinematics(config) if config.dof else None
@@ -128,6 +129,18 @@ class RigControl:
             if self.is_hardware:
                 self.close(reason)
 
+    @property
+    def warnings(self) -> set[str]:
+        """The flags since the last acknowledgement, also of runs that have ended."""
+        latched = () if self.run is None else self.run.loop.supervision.latched
+        return self._warnings.union(latched)
+
+    def acknowledge(self) -> None:
+        """Forget the warnings."""
+        self._warnings.clear()
+        if self.run is not None:
+            self.run.loop.acknowledge()
+
     def note(self, text: str) -> None:
         """Write a note into the log, if there is one."""
         if self.run is not None:
@@ -185,7 +198,8 @@ class RigControl:
             self.run.log.warn(text)
 
     def _end(self, run: ControlRun) -> None:
-        """Close the log in the background, because the disk may be slow."""
+        """Keep the warnings, and close the log in the background, because the disk may be slow."""
+        self._warnings.update(run.loop.supervision.latched)
         thread = threading.Thread(target=run.log.close, name="closing")
         self._endings = [each for each in self._endings if each.is_alive()]
         self._endings.append(thread)

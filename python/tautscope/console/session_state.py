@@ -45,6 +45,7 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     state.is_recording = control.is_recording
     state.refused = dict(operator.refused)
     state.stopped_at = control.stopped_at
+    state.latched = tuple((name, advice(name)) for name in by_urgency(control.warnings))
     if run is not None:
         _add_run(state, run)
         if control.config.dof:
@@ -71,7 +72,6 @@ def _add_run(state: State, run: ControlRun) -> None:
         state.width_std = known(2 * hysteresis.width_std)
     supervision = loop.supervision
     state.reaction, state.flags = str(supervision.reaction), supervision.flags
-    state.latched = tuple((name, advice(name)) for name in by_urgency(supervision.latched))
     state.lead = supervision.lead
     state.late = run.late, run.ticks
     if report is not None:
