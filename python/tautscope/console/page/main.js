@@ -53,7 +53,9 @@ function reply(text, isRefused) {
 
 /** Go to a time of a recording, or stay, and play on or not. */
 const seek = (time, isPlaying) => control.send({ type: "seek", time, is_playing: isPlaying });
-const stop = () => control.send({ type: "stop" });
+const stop = () => {
+  if (!control.send({ type: "stop" })) reply("STOP was NOT sent: no connection. Use the emergency stop.", true);
+};
 
 const control = new Link("/control", token, {
   onMessage(data) {
@@ -63,6 +65,8 @@ const control = new Link("/control", token, {
       if (!layout) build(message.layout);
     } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
+      // An element with the focus does not show the state, which is another than asked for.
+      if (!isAccepted && !isText(document.activeElement)) document.activeElement?.blur();
       reply(`${what}: ${isAccepted ? "done" : "refused"}${reason && `, ${reason}`}`, !isAccepted);
     } else {
       state = { ...message.state, latency: message.latency };
@@ -128,7 +132,7 @@ function controlsOf({ name }, k) {
   $("dofs").insertAdjacentHTML("beforeend", `<span>${name}</span><span><kbd></kbd><span class="touch">
     <button aria-label="${name} backwards">−</button> <button aria-label="${name} forwards">+</button></span></span>
     <input type="range" min="0.05" max="1" step="0.05" aria-label="scale of ${name}"><output></output>
-    <label><input type="checkbox" checked> clutch</label>`);
+    <label><input type="checkbox" checked aria-label="clutch of ${name}"> clutch</label>`);
   const last = (selector) => [...$("dofs").querySelectorAll(selector)].at(-1);
   const [clutch, scale, output, keys] = ["[type=checkbox]", "[type=range]", "output", "kbd"].map(last);
   [...last(".touch").children].forEach((button, side) => steering.bind(button, k, 2 * side - 1));
@@ -270,7 +274,7 @@ function update() {
   const isOld = performance.now() - view.drawnAt > LOST;
   $("stale").hidden = !isOld || !hasImage || (!isLost && state.replay !== null && !state.replay[2]);
   if (isLost) {
-    $("message").textContent = "No data from the control process. Motion has stopped; use the emergency stop if not.";
+    $("message").textContent = "No data from the control process. What this page moved rests; another page may steer. If in doubt, use the emergency stop.";
     return;
   }
   $("message").textContent = state.message;
@@ -282,6 +286,8 @@ function update() {
   showWarnings();
   showLease();
   showControls();
+  // In Firefox it would swallow every key, also Escape.
+  if (document.activeElement?.disabled) document.activeElement.blur();
   showTime();
   showPointing();
   facts();
