@@ -11,9 +11,12 @@ import pytest
 import tautscope
 from numpy.typing import ArrayLike
 from ros2.peers import peers
+from service_client import Client
 from tautscope.errors import StateError
+from tautscope.loop.measurement import Tip
 from tautscope.loop.rig import Sample
 from tautscope.ros2 import types
+from tautscope.ros2.wire import Qos
 
 
 class Arm:
@@ -23,7 +26,7 @@ class Arm:
 
     def __init__(self) -> None:
         self.is_closed = self.is_interrupted = False
-        self.duration = 0.3
+        self.duration, self.time = 0.3, 0.0
 
     def reset(self) -> Sample:
         end = time.monotonic() + self.duration
@@ -34,7 +37,9 @@ class Arm:
         return self.step(np.zeros(2))
 
     def step(self, command: ArrayLike) -> Sample:
-        return Sample(0.0, np.array(command))
+        self.time += self.control_period
+        position = np.array(command)
+        return Sample(self.time, position, measurement=Tip(position, self.time))
 
     def close(self) -> None:
         self.is_closed = True
@@ -88,3 +93,21 @@ def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
         both.tick()
         assert both.control.fault.endswith("; bend_x: quick stop is not confirmed")
         assert both.control.fault in [each.data for each in both.drain(both.warnings)]
+
+
+def test_the_share_of_the_compensation_in_use_is_published(tmp_path: Path) -> None:
+    arm, config = Arm(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both, Client(both) as client:
+        shares = both.other.subscription(
+            "/instrument/hysteresis/compensation", "std_msgs/msg/Float64", Qos(depth=100)
+        )
+        both.delivered(resend=True)
+        both.enable(np.zeros(2))
+        for share in (1.0, 0.0):
+            client.set_parameters(("compensation", share))
+            both.drain(shares)
+            for _ in range(5):
+                both.tick()
+            assert {each.data for each in both.drain(shares)} == {share}

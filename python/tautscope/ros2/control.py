@@ -130,7 +130,7 @@ class NodeControl:
                 self._telemetry.update(run, source, report)
             self._telemetry.tick(run)
             supervision = run.loop.supervision
-            share = supervision.lead * float(self.parameters["compensation"])
+            share = supervision.lead * run.compensation
             self._achieved.add_tick(run.sample, run.reference, run.command, share)
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
                 self._is_disabling = supervision.reaction is Reaction.DISABLE
@@ -161,7 +161,7 @@ class NodeControl:
 
     def _set_compensation(self, share: float) -> None:
         if self.run is not None:
-            self.run.loop.set_compensation(share)
+            self.run.set_compensation(share)
 
     def _take_command(self) -> str | None:
         try:
