@@ -17,6 +17,9 @@ is the tip degree by degree, 1 that of `_own` by differences, 2 with its Jacobia
 ``tip_paper`` and ``tip_best`` are of two degrees of freedom, measured as they are: the same files,
 with (2,) in place of (3,), and in ``NAME.images`` the tip (2,) in place of features.
 
+Except of the axes the reference rests in the second tick, in which nodes and controllers of ROS
+begin to follow it.
+
 ``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
 starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
 px; NaN is not known.
@@ -140,7 +143,7 @@ def record_features(profile: Profile) -> Record:
     waiting: list[tuple[int, NDArray[np.float64]]] = []
     for tick in range(round(DURATION / PERIOD)):
         time = tick * PERIOD
-        reference = CENTRES + AMPLITUDES * np.sin(2 * np.pi * time / PERIODS)
+        reference = CENTRES + AMPLITUDES * np.sin(2 * np.pi * max(time - PERIOD, 0) / PERIODS)
         if time >= JUMP[0]:
             reference += JUMP[1]
         age = 0.01 if 10 <= time < 15 else np.nan
@@ -171,7 +174,8 @@ def record_frames(folder: Path) -> Record:
     sample = rig.reset()
     with (folder / "frames.pixels").open("wb") as pixels:
         while sample.time < 2.0:
-            reference = CENTRES + AMPLITUDES * np.sin(np.pi * sample.time / 2) / 2
+            moved = max(sample.time - rig.control_period, 0)
+            reference = CENTRES + AMPLITUDES * np.sin(np.pi * moved / 2) / 2
             command = record.step(sample.time, reference)
             if (frame := sample.frame) is not None:
                 pixels.write(frame.image.tobytes())
@@ -273,8 +277,8 @@ def record_tip(profile: Profile) -> Record:
     random = np.random.default_rng(SEED)
     tip, late = np.zeros(2), []
     for tick in range(8000):
-        time = tick * 0.005
-        reference = [1.0, 10e-3] * np.sin(2 * np.pi * time / np.array([4.0, 5.0]))
+        time, moved = tick * 0.005, max(tick - 1, 0) * 0.005
+        reference = [1.0, 10e-3] * np.sin(2 * np.pi * moved / np.array([4.0, 5.0]))
         command = record.step(time, reference, {4000: 4, 4400: 5}.get(tick, 0))
         tip = np.clip(tip, command - SLACK / 2, command + SLACK / 2)
         late.append((time, tip + random.normal(0, 1e-3, 2) * [1.2, 12e-3]))

@@ -7,6 +7,8 @@ from typing import Any
 
 USAGE, REFUSED, STOPPED = 2, 3, 4
 """Exit status of the command line: bad input; refused by the rig; stopped for safety."""
+EMERGENCY_STOP = "Use the emergency stop"
+"""Begins the remedy of an error, or of its notes, after which motors may still move."""
 
 
 class TautscopeError(Exception):
@@ -213,3 +215,8 @@ class NoRigError(CameraError):
 
 class CameraMismatchError(CameraError):
     """A source that differs from its configuration; reopening it does not help."""
+
+
+def described(error: BaseException) -> str:
+    """An error with its notes, such as drives that did not confirm the stop after it."""
+    return "; ".join([str(error), *getattr(error, "__notes__", ())])

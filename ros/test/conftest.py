@@ -126,6 +126,14 @@ class Laboratory(Node):
         self.wait_for(lambda: self.requests.get_subscription_count() > 0)
         self.requests.publish(StringStamped(string=text))
 
+    def measure(self, position: NDArray[np.float64]) -> None:
+        """Publish where the drives are (3,), once the node listens."""
+        self.wait_for(lambda: self.drives.get_subscription_count() > 0)
+        message = JointState(name=JOINTS, position=list(position))
+        message.header.stamp = self.get_clock().now().to_msg()
+        self.drives.publish(message)
+        self.spin(0.2)
+
     def refer(self, position: NDArray[np.float64]) -> int:
         """Publish a reference (3,); its stamp [ns]."""
         now = self.get_clock().now()

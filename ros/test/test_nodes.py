@@ -55,6 +55,7 @@ def test_a_session(laboratory, recorded):
     assert laboratory.commands == []
 
     # The recording, with its images.
+    laboratory.measure(recorded.ticks[0][2:5])
     laboratory.request("enable")
     laboratory.wait_for(lambda: laboratory.states[-1] == "ENABLED")
     last, shown = laboratory.replay(recorded)
@@ -98,6 +99,7 @@ def test_a_session(laboratory, recorded):
     sent = len(laboratory.commands)
     laboratory.spin(0.2)
     assert len(laboratory.commands) == sent
+    laboratory.measure(laboratory.commands[-1].position)
     laboratory.request("enable")
     laboratory.wait_for(lambda: laboratory.states[-1] == "ENABLED")
 
@@ -112,7 +114,7 @@ def test_a_session(laboratory, recorded):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_end_of_the_process_stops_the_drives(laboratory, processes, recorded, number):
-    laboratory.wait_for(lambda: laboratory.references.get_subscription_count() > 0)
+    laboratory.measure(recorded.ticks[0][2:5])
     laboratory.request("enable")
     laboratory.wait_for(lambda: laboratory.states[-1] == "ENABLED")
     for _ in range(20):
@@ -125,24 +127,19 @@ def test_an_end_of_the_process_stops_the_drives(laboratory, processes, recorded,
     assert processes[0].wait(10) == 0
 
 
+def test_enable_is_refused_while_it_is_not_known_where_the_drives_are(laboratory):
+    laboratory.request("enable")
+    laboratory.wait_for(lambda: any("enable is refused" in text for text in laboratory.warnings))
+    assert laboratory.states[-1] == "DISABLED"
+
+
 def test_motion_begins_where_the_drives_are(laboratory, recorded):
     reference = recorded.ticks[0][2:5]
     position = reference + np.array([5e-3, 0.2, 0.1])
-    laboratory.wait_for(lambda: laboratory.drives.get_subscription_count() > 0)
-    message = laboratory_message(laboratory, position)
-    laboratory.drives.publish(message)
-    laboratory.spin(0.2)
+    laboratory.measure(position)
     laboratory.request("enable")
     laboratory.wait_for(lambda: bool(laboratory.commands))
     assert list(laboratory.commands[-1].position) == position.tolist()
-
-
-def laboratory_message(laboratory, position):
-    from sensor_msgs.msg import JointState
-
-    message = JointState(name=JOINTS, position=position.tolist())
-    message.header.stamp = laboratory.get_clock().now().to_msg()
-    return message
 
 
 def test_the_share_of_the_compensation_is_checked(laboratory):

@@ -21,6 +21,7 @@ from console.steering import DEVICES, GAMEPAD, holding, use_all_controls
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from running import AGE, Arm, RunningConsole, rests, running_console
 from tautscope.config import load_config
+from tautscope.console.messages import Setting
 from tautscope.console.paced_rig import PacedRig
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
@@ -270,6 +271,68 @@ def test_keys_steer_after_a_click_on_any_control(console: RunningConsole, open_p
         page.keyboard.up("ArrowUp")
         page.keyboard.press("Escape")
         expect(page.locator("#motion"), control).to_have_text("STOPPED", timeout=TIMEOUT)
+
+
+def test_a_key_whose_release_macos_does_not_tell_moves_nothing(
+    console: RunningConsole, open_page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = open_page()
+    take(page)
+    # So slow that it does not come to an end by itself.
+    monkeypatch.setattr(console.control.operator, "scale", np.full(3, 0.02))
+    page.keyboard.down("ArrowUp")
+    wait(lambda: moves(console))
+    page.keyboard.down("Meta")
+    wait(lambda: not moves(console))
+    page.keyboard.up("Meta")
+    assert rests(console)
+
+
+def test_a_control_that_is_disabled_gives_up_the_focus(open_page) -> None:
+    """Chromium does that by itself; in Firefox it would swallow every key."""
+    page = open_page()
+    page.evaluate(
+        "window.focused = {disabled: true, blur() { this.isBlurred = true }};"
+        "Object.defineProperty(document, 'activeElement', {get: () => focused})"
+    )
+    wait(lambda: page.evaluate("focused.isBlurred"))
+
+
+def test_a_control_shows_the_state_after_a_refusal(
+    console: RunningConsole, open_page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = open_page()
+    take(page)
+    refusal = console.control.lease.refusal
+
+    def refuse(client: int, command: Any, now: float, *, needs_image: bool) -> str:
+        found = refusal(client, command, now, needs_image=needs_image)
+        return "late" if isinstance(command, Setting) else found
+
+    monkeypatch.setattr(console.control.lease, "refusal", refuse)
+    clutch = page.get_by_role("checkbox", name="clutch of rotation")
+    clutch.click()
+    expect(page.locator("#reply")).to_have_text("clutch: refused, late", timeout=TIMEOUT)
+    expect(clutch).to_be_checked(timeout=TIMEOUT)
+
+
+def test_a_page_without_a_connection_says_that_stop_was_not_sent(
+    browser: Browser, tmp_path: Path
+) -> None:
+    context = browser.new_context()
+    context.set_default_timeout(TIMEOUT)
+    with running_console(tmp_path) as console:
+        page = context.new_page()
+        page.goto(console.url)
+        expect(page.locator("body")).to_have_attribute("data-motion", "ready", timeout=TIMEOUT)
+        os.kill(console.server.pid, signal.SIGKILL)
+        expect(page.locator("#motion")).to_have_text("NO DATA", timeout=TIMEOUT)
+        expect(page.locator("#message")).to_contain_text("another page may steer")
+        page.keyboard.press("Escape")
+        expect(page.locator("#reply")).to_have_text(
+            "STOP was NOT sent: no connection. Use the emergency stop."
+        )
+    context.close()
 
 
 @contextmanager

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tautscope
 from drawn import short_experiment
 from recorded import record
+from running import Arm
 from tautscope.console import messages as msg
 from tautscope.console.log_player import LogPlayer
+from tautscope.console.rig_control import RigControl
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.log.reader import Tick, read_log
 
@@ -85,3 +89,25 @@ def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
         assert seek(None, is_playing=False)["time"] == ticks[-1].sample.time
     finally:
         player.close()
+
+
+def test_a_time_before_a_change_shows_the_compensation_then(tmp_path: Path) -> None:
+    config = tautscope.axes(2, width_limit=1.0)
+    with ThreadPoolExecutor(1) as executor:
+        control = RigControl(config, Arm(2), tmp_path, executor)
+        control.open()
+        assert control.run is not None
+        for tick in range(200):
+            if tick == 100:
+                control.run.set_compensation(0.0)
+            control.run.tick()
+            control.run.step()
+        control.shut_down()
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    player = LogPlayer(read_log(tmp_path / "console-1.mcap"), Channels(memory))
+    found = []
+    for time in (0.0, 0.9, 0.1):
+        player._seek(time)
+        found.append(player._state.compensation)
+    player.close()
+    assert found == [1.0, 0.0, 1.0]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import re
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,14 +14,29 @@ from types import SimpleNamespace
 import numpy as np
 import own_catheter
 import pytest
+import tautscope
+from numpy.typing import ArrayLike
 from running import Arm, Page, RunningConsole, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
+from tautscope.console.actions import Actions
 from tautscope.console.lease import ImageTimes, Lease
-from tautscope.console.messages import Received, Servo, decode_state
+from tautscope.console.messages import (
+    Action,
+    Received,
+    Reply,
+    Servo,
+    SetProfile,
+    decode_state,
+)
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
+from tautscope.console.rig_control import INTERRUPTED, RigControl
+from tautscope.console.session import Session
+from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
+from tautscope.console.state import LogState
+from tautscope.errors import StateError
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
@@ -114,6 +131,157 @@ def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
         tick = by_time[state["time"]]
         assert np.allclose(state["command"], tick.command)
         assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
+
+
+class Slow(Arm):
+    """Its reset moves until it is interrupted, or for as long as `duration` [s]."""
+
+    duration, is_interrupted = 20.0, False
+
+    def reset(self) -> Sample:
+        end = time.monotonic() + self.duration
+        while time.monotonic() < end and not self.is_interrupted:
+            time.sleep(0.001)
+        if self.is_interrupted:
+            raise StateError("rig", "interrupted", "Call reset() to start again")
+        return super().reset()
+
+
+class Interrupted(Slow):
+    def interrupt(self) -> None:
+        self.is_interrupted = True
+
+
+@pytest.mark.parametrize("cause", ["STOP by page 2", "The page was away"])
+@pytest.mark.parametrize("kind", [Interrupted, Slow])
+def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[Slow], cause: str
+) -> None:
+    arm, states = kind(2), []
+    monkeypatch.setattr(Slow, "duration", 0.5 if kind is Slow else 20.0)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(tautscope.axes(2, width_limit=1.0), rig, tmp_path, executor)
+        monkeypatch.setattr(control.operator, "is_present", lambda now: not states)
+
+        def look() -> None:
+            states.append(session_state(control, LogState(), time.monotonic()))
+            if cause.startswith("STOP") and len(states) == 2:
+                control.stop(cause)
+
+        if cause.startswith("STOP"):
+            monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+        control.while_opening = look
+        control.open()
+        assert arm.is_interrupted == (kind is Interrupted)
+        assert control.run is None
+        assert control.fault == INTERRUPTED
+        assert (states[0].motion, states[0].drives) == ("opening", "being enabled")
+        if kind is Slow:
+            assert states[-1].motion == "stopped"
+            assert states[-1].message == (
+                f"{cause}. The rig's reset has not ended: use the emergency stop."
+            )
+        control.shut_down()
+
+
+class Unconfirmed(Arm):
+    """Its drives do not confirm a stop: `close` says so, or a note of the error of `step`."""
+
+    close_error = step_error = None
+
+    def step(self, command: ArrayLike) -> Sample:
+        if self.step_error is not None:
+            raise self.step_error
+        return super().step(command)
+
+    def close(self) -> None:
+        if self.close_error is not None:
+            raise self.close_error
+
+
+@pytest.mark.parametrize("where", ["close", "step"])
+def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    arm, config = Unconfirmed(2), tautscope.axes(2, width_limit=1.0)
+    note = "bend_x: quick stop is not confirmed. Use the emergency stop: the motor may be moving"
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(config, rig, tmp_path, executor)
+        session = Session(control, Channels(memory))
+        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+
+        def shown() -> tuple[str, str, str]:
+            state = session_state(control, LogState(), time.monotonic())
+            return state.motion, state.message, state.drives
+
+        control.open()
+        assert shown()[2] == "enabled"
+        if where == "close":
+            arm.close_error = StateError(*re.split(r"[:.] ", note, maxsplit=2))
+            control.stop("STOP by page 1")
+        else:
+            arm.step_error = StateError("bend_y", "fault 12", "See the manual")
+            arm.step_error.add_note(note)
+            session._tick(control.run)
+        assert control.run is None
+        motion, message, drives = shown()
+        assert motion == "unconfirmed"
+        assert message.startswith("THE MOTORS MAY STILL MOVE: ")
+        assert note in message
+        assert drives == "THE MOTORS MAY STILL MOVE"
+        arm.close_error = arm.step_error = None
+        control.operator.enable()
+        control.open()
+        assert shown()[::2] == ("ready", "enabled")
+        control.shut_down()
+        session._publisher.close()
+
+
+@pytest.mark.parametrize("is_simulated", [True, False])
+def test_neither_a_hold_nor_a_warning_ends_with_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_simulated: bool
+) -> None:
+    config = tautscope.axes(2, width_limit=1.0)
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: Arm(2), 0.005, is_simulated=is_simulated)
+        control = RigControl(config, rig, tmp_path, executor)
+        session, actions = Session(control, Channels(memory)), Actions(control, lambda: None)
+        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+
+        def shown() -> tuple[str, list[str]]:
+            state = session_state(control, LogState(), time.monotonic())
+            return state.motion, [name for name, _ in state.latched]
+
+        def execute(number: int, **fields: str) -> Reply | None:
+            kind = SetProfile if "profile" in fields else Action
+            message = kind(control.lease.number, number, 0, **fields)
+            return actions.execute(Received(1, time.monotonic(), message))
+
+        control.lease.take(1)
+        control.open()
+        session._tick(control.run)
+        control.run.loop.raise_flag("reference_jump")
+        session._tick(control.run)
+        reply = execute(1, profile="paper")
+        assert (reply.is_accepted, reply.reason) == (False, "motion is held, press Enable first")
+        assert shown() == ("held", ["reference_jump"])
+        execute(2, name="enable")
+        session._tick(control.run)
+        if is_simulated:
+            assert execute(3, profile="paper").is_accepted
+            assert shown() == ("ready", ["reference_jump"])
+        else:
+            control.run.loop.raise_flag("drive_fault")
+            session._tick(control.run)
+            assert shown() == ("off", ["drive_fault", "reference_jump"])
+        assert execute(4, name="acknowledge").is_accepted
+        assert shown()[1] == []
+        control.shut_down()
+        session._publisher.close()
 
 
 def broken(*_: object) -> Sample:

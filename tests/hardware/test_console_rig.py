@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_rig import Setup
-from tautscope.console.messages import Received, Servo
+from tautscope.console.messages import Action, Received, Servo, Stop, encode
 from tautscope.console.rig_control import INTERRUPTED, RigControl
+from tautscope.console.session import Session
+from tautscope.console.shared import Channels, SharedMemory
 from tautscope.dof import Dof
 
 NOTHING: Callable[[], None] = lambda: None  # noqa: E731
@@ -96,3 +99,42 @@ def test_a_quick_stop_by_the_supervisor_needs_a_new_start(desk: Desk) -> None:
     desk.open(desk.be_present)
     assert desk.control.run is not None
     assert desk.control.run is not run
+
+
+@pytest.mark.parametrize("is_opening", [False, True], ids=["link", "double click"])
+def test_an_enable_that_waited_does_not_undo_a_stop(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, is_opening: bool
+) -> None:
+    memory = SharedMemory(multiprocessing.get_context("spawn"), desk.setup.config)
+    page, session = Channels(memory), Session(desk.control, Channels(memory))
+    monkeypatch.setattr(desk.control.operator, "is_present", lambda now: True)
+    sent = []
+
+    def stop() -> None:
+        if not sent:
+            sent.append(len(desk.setup.motors.commands))
+            page.stop.write(encode(Received(2, time.monotonic(), Stop())))
+
+    def enable(number: int) -> None:
+        action = Action(desk.control.lease.number, number, 0, "enable")
+        page.inbound.write(encode(Received(1, time.monotonic(), action)))
+
+    receive = desk.control.while_opening
+    desk.control.while_opening = lambda: (desk.setup.motors.commands and stop(), receive())
+    enable(1)
+    if is_opening:
+        enable(2)  # a double click; STOP follows while the motors move to the start
+    else:
+        stop()  # both arrive together
+    time.sleep(0.001)
+    session._receive()
+    assert desk.control.run is None
+    assert desk.control.operator.stopped_by == "STOP by page 2"
+    assert len(desk.setup.motors.commands) <= sent[0] + 20 * is_opening
+    assert desk.setup.motors.stopped == is_opening
+    assert desk.control.operator.refused["motion was stopped after it, press Enable again"] == 1
+    time.sleep(0.001)
+    enable(3)
+    session._receive()
+    assert desk.control.run is not None, desk.control.fault
+    session._publisher.close()

@@ -26,6 +26,8 @@ class Time:
     """A time in ns."""
 
     def __init__(self, *, nanoseconds: int = 0) -> None:
+        if nanoseconds < 0:
+            raise ValueError("Nanoseconds value must not be negative")
         self.nanoseconds = nanoseconds
 
     def to_msg(self) -> SimpleNamespace:

@@ -21,11 +21,20 @@ class Refused(Executor):
         raise AssertionError
 
 
+def enabled(executor, config=None):
+    """A loop whose drives are at START, which it enables."""
+    control = ControlLoop(config or Config(), executor)
+    control.set_measured(START)
+    control.request("enable")
+    return control
+
+
 class Rig:
     """A loop with its clock, and an operator who moves the insertion."""
 
     def __init__(self):
         self.control = ControlLoop(Config(), Refused())
+        self.control.set_measured(START)
         self.reference = START.copy()
         self.time = 100.0
         self.commands = []
@@ -55,12 +64,14 @@ class Rig:
         return times, steps.max(initial=0)
 
 
-def test_nothing_is_sent_before_it_is_enabled_and_referenced():
+def test_nothing_is_sent_before_it_is_enabled():
     rig = Rig()
     tick = rig.move(0.1)
     assert (tick.is_sent, tick.state) == (False, OperatingState.DISABLED)
     assert rig.control.request("enable")
-    assert not rig.wait(0.1).is_sent
+    tick = rig.wait(0.1)
+    assert tick.is_sent
+    assert (tick.command == START).all()
     tick = rig.move(0.1)
     assert tick.is_sent
     assert tick.command[0] > START[0]
@@ -127,7 +138,9 @@ def test_a_drive_fault_stops_the_drives_until_enabled():
     tick = rig.move(0.1)
     assert (tick.is_sent, tick.state) == (False, OperatingState.FAULT)
     rig.control.request("resume")
-    assert rig.wait(PERIOD).state is OperatingState.FAULT
+    tick = rig.wait(PERIOD)
+    assert tick.state is OperatingState.FAULT
+    rig.control.set_measured(tick.command)
     rig.control.request("enable")
     tick = rig.move(0.5)
     assert (tick.is_sent, tick.state) == (True, OperatingState.ENABLED)
@@ -156,12 +169,45 @@ def test_motion_begins_where_the_drives_are():
     assert rig.control.is_misplaced
 
 
+@pytest.mark.parametrize("has_times", [False, True], ids=["chained", "simulated time"])
+@pytest.mark.parametrize("requests", [["enable"], ["enable", "pause", "resume"]])
+def test_the_first_reference_is_where_the_operator_is(has_times, requests):
+    rig = Rig()
+    for request in requests:
+        rig.control.request(request)
+    rig.reference = START + np.array([20e-3, 1.5, -0.7])
+    for _ in range(20):
+        # A reference of each tick, made in it.
+        rig.control.set_reference(rig.reference, rig.time if has_times else None)
+        tick = rig.wait(0)
+        assert tick.is_sent
+        assert (tick.command == START).all()
+    rig.move(0.5)
+    assert rig.motion(0.0)[0]
+    assert rig.motion(0.0)[1] < 1e-3
+
+
+def test_enable_is_refused_while_it_is_not_known_where_the_drives_are():
+    rig = Rig()
+    rig.control = ControlLoop(Config(), Refused())
+    rig.control.set_measured([np.nan, 0.0, 0.9])
+    assert rig.control.request("enable")
+    tick = rig.move(0.1)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.DISABLED)
+    assert rig.control.is_unmeasured
+    rig.control.set_measured(START)
+    rig.control.request("enable")
+    assert rig.wait(0.1).is_sent
+    assert not rig.control.is_unmeasured
+
+
 def test_a_reference_from_before_neither_begins_nor_stops_a_motion():
     rig = Rig()
     rig.control.request("enable")
     rig.control.set_reference(START, rig.time - 1.0)
     tick = rig.wait(0.5)
-    assert (tick.is_sent, tick.state) == (False, OperatingState.ENABLED)
+    assert (tick.is_sent, tick.state) == (True, OperatingState.ENABLED)
+    assert (tick.command == START).all()
     rig.move(0.5)
     rig.control.request("pause")
     rig.wait(0.5)
@@ -189,8 +235,7 @@ def test_the_commands_are_those_of_the_loop_alone(profile, monkeypatch):
     for name, value in shorter.items():
         monkeypatch.setattr(record, name, value)
     recorded = record.record_features(profile)
-    control = ControlLoop(recorded.config, Refused())
-    control.request("enable")
+    control = enabled(Refused(), recorded.config)
     images = iter(recorded.images)
     image = next(images)
     states = set()
@@ -211,6 +256,7 @@ def test_the_commands_are_those_of_the_loop_alone(profile, monkeypatch):
         tick = control.step(time)
         states.add(tick.state)
         assert tick.command.tolist() == expected, f"tick {number}"
+        control.set_measured(tick.command)
         while image is not None and image[0] == number:
             features = image[2:6]
             control.loop.on_features(None if np.isnan(features).all() else features, image[1])
@@ -237,8 +283,7 @@ class Held(Executor):
 
 def test_ticks_go_on_while_an_image_is_detected():
     executor = Held()
-    control = ControlLoop(Config(), executor)
-    control.request("enable")
+    control = enabled(executor)
     control.set_reference(START, 0.0)
     image = np.zeros((576, 720, 3), np.uint8)
     frames = [Frame(image, number * PERIOD, number) for number in range(4)]
@@ -256,8 +301,7 @@ def test_ticks_go_on_while_an_image_is_detected():
 
 
 def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
-    control = ControlLoop(Config(), Held())
-    control.request("enable")
+    control = enabled(Held())
     control.set_reference(START, 0.0)
     control.step(0.0)
     monkeypatch.setattr("tautscope.loop.vision.MarkerDetector", None)
@@ -266,8 +310,7 @@ def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
 
 def test_images_go_through_a_thread():
     with ThreadPoolExecutor(1) as executor:
-        control = ControlLoop(Config(), executor)
-        control.request("enable")
+        control = enabled(executor)
         frame = Frame(np.zeros((576, 720, 3), np.uint8), 0.0, 1)
         control.set_reference(START, 0.0)
         control.step(0.0)

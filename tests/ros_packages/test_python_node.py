@@ -25,6 +25,11 @@ class Laboratory:
         self.node = InstrumentNode()
         assert self.node.on_configure(None) == "success"
         assert self.node.on_activate(None) == "success"
+        self.measure(START)
+
+    def measure(self, position):
+        message = stamped(self.node.now, name=JOINTS, position=list(position))
+        self.node.callbacks["actuators/measured_js"](message)
 
     def run(self, duration, speed=None):
         """Timers of the node, with a reference in every tick if it has a speed [m/s]."""
@@ -106,6 +111,28 @@ def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
     assert any("reference_late" in text for text in laboratory.warnings())
 
 
+def test_enable_is_refused_with_a_warning_while_the_drives_are_silent(laboratory):
+    laboratory.node.on_cleanup(None)
+    laboratory.node.on_configure(None)
+    laboratory.node.on_activate(None)
+    laboratory.request("enable")
+    laboratory.run(0.2, speed=0.01)
+    assert laboratory.node.published["actuators/setpoint_js"] == []
+    assert laboratory.states()[-1] == "DISABLED"
+    assert laboratory.warnings()[-1] == "enable is refused: it is not known where the drives are"
+    assert laboratory.node.published["/diagnostics"][-1].status[0].level == doubles.Message.ERROR
+
+
+def test_what_was_requested_before_is_not_executed_when_it_is_activated(laboratory):
+    laboratory.node.on_deactivate(None)
+    laboratory.request("enable")
+    laboratory.node.now += 600 * 10**9
+    laboratory.node.on_activate(None)
+    laboratory.run(0.2, speed=0.01)
+    assert laboratory.node.published["actuators/setpoint_js"] == []
+    assert laboratory.states()[-1] == "DISABLED"
+
+
 def test_an_old_reference_stops_the_motion_though_it_arrives_now(laboratory):
     laboratory.request("enable")
     laboratory.run(0.5, speed=0.01)
@@ -134,6 +161,26 @@ def test_the_tip_has_a_stamp_of_zero_without_markers(laboratory):
     assert len(laboratory.node.published["hysteresis/delta"][0].data) == 6
 
 
+def test_a_stamp_before_1970_ends_nothing(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.05, speed=0.0)
+    size = {"width": 720, "height": 576, "step": 2160, "data": bytes(720 * 576 * 3)}
+    joints = {"name": JOINTS, "position": START}
+    for seconds in (-1, -(2**31)):
+        for topic, fields in (
+            ("/endoscope/image_raw", {"encoding": "bgr8", **size}),
+            ("actuators/measured_js", joints),
+            ("servo_jp", joints),
+        ):
+            message = stamped(0, **fields)
+            message.header.stamp.sec = seconds
+            laboratory.node.callbacks[topic](message)
+        while not laboratory.node.published["hysteresis/delta"]:
+            laboratory.run(0.05)
+        laboratory.node.published["hysteresis/delta"].clear()
+    assert laboratory.states()[-1] == "PAUSED"
+
+
 @pytest.mark.parametrize("end", ["on_deactivate", "on_cleanup", "on_shutdown", "on_error"])
 def test_every_end_stops_the_drives_once(laboratory, end):
     laboratory.request("enable")
@@ -160,6 +207,7 @@ def test_a_fault_of_the_drives_stops_them_until_it_is_cleared(laboratory):
     stops = laboratory.texts("actuators/state_command")
     assert set(stops) == {"pause"}
     assert 5 <= len(stops) <= 7
+    laboratory.measure(laboratory.node.published["actuators/setpoint_js"][-1].position)
     laboratory.request("enable")
     laboratory.run(0.1, speed=0.01)
     assert len(laboratory.node.published["actuators/setpoint_js"]) > sent
@@ -226,6 +274,8 @@ class TestAnotherRobot:
         node = InstrumentNode()
         assert node.on_configure(None) == "success"
         assert node.on_activate(None) == "success"
+        drives = stamped(node.now, name=list(self.JOINTS), position=[0.0, 0.0])
+        node.callbacks["actuators/measured_js"](drives)
         return node
 
     def tick(self, node, reference=None):
@@ -255,6 +305,16 @@ class TestAnotherRobot:
         assert node.logged[-1].startswith("Tip less reference, RMS: bend_x ")
         (label, _) = node.published["hysteresis/delta"][-1].layout.dim
         assert (label.label, label.size, label.stride) == ("bend_x,bend_y", 2, 4)
+
+    def test_measurements_do_not_pile_up_without_ticks(self, node):
+        node.on_deactivate(None)
+        for _ in range(200):
+            node.now += 10_000_000
+            node.callbacks["/left"](stamped(node.now, name=["bend_x"], position=[0.0]))
+        node.on_activate(None)
+        node.callbacks["state_command"](doubles.Message(string="enable"))
+        self.tick(node, [0.0, 0.0])
+        assert len(node.published["hysteresis/delta"]) == 64
 
     def test_a_wrong_frame_name_or_time_is_named_and_not_used(self, node):
         node.callbacks["state_command"](doubles.Message(string="enable"))

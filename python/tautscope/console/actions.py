@@ -57,6 +57,9 @@ class Actions:
         reason = control.lease.refusal(
             client, message, time.monotonic(), needs_image=what in PROGRAMS
         )
+        if not reason and what == "enable" and inbound.at <= control.ended_at:
+            # It waited, at a link that stood or while the rig opened, and must not undo the stop.
+            reason = "motion was stopped after it, press Enable again"
         if reason:
             control.operator.refused[reason] += 1
         else:
@@ -98,6 +101,8 @@ class Actions:
         control = self._control
         if control.operator.is_moving:
             return "the instrument moves"
+        if control.run is not None and control.run.is_held:
+            return "motion is held, press Enable first"  # the new loop would not hold it
         if message.profile != control.config.profile:
             try:
                 config = control.config.replace(profile=message.profile)
@@ -136,8 +141,7 @@ class Actions:
         return ""
 
     def _acknowledge(self, _: msg.Action) -> str:
-        if self._control.run is not None:
-            self._control.run.loop.acknowledge()
+        self._control.acknowledge()
         return ""
 
     def _release(self, _: msg.Action) -> str:

@@ -128,6 +128,7 @@ class LogPlayer:
         self._offset = None
         self._model: PlayTip | None = None
         self._score = Score(len(self._log.config.dofs), self._log.config.control.period)
+        self._state.compensation = 1.0  # unless a request before that time changed it
         if not self._times:
             return
 

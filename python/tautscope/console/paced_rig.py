@@ -69,6 +69,12 @@ class PacedRig:
         self._pace.wait()
         return sample
 
+    def interrupt(self) -> None:
+        """Quick-stop a rig that can be interrupted, as a `MotorRig`; for any thread."""
+        interrupt: Callable[[], None] | None = getattr(self._rig, "interrupt", None)
+        if interrupt is not None:
+            self._checked(interrupt)
+
     def close(self) -> None:
         """Stop the motors; the next `reset` makes another rig."""
         rig, self._rig = self._rig, None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -17,17 +18,15 @@ from tautscope.console.control_run import ControlRun
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
-from tautscope.errors import TautscopeError
+from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
-from tautscope.loop.rig import Rig, Sample, check_sample
+from tautscope.loop.rig import Rig, Sample, check_sample, reset_unless
 
 _LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
-_IDLE_PERIOD = 0.005
-"""Time between two calls of `while_opening` [s]."""
 
 
 class RigControl:
@@ -46,8 +45,11 @@ class RigControl:
         operator: The source of the reference.
         run: The present run; None while the rig is off.
         fault: Why the rig is off; empty if it is not, or was never on.
+        unconfirmed: Why the motors may still move although they were stopped; empty if they do not.
         is_opening: Whether the drives are being enabled.
+        is_interrupted: Whether this has to end, or had to: by STOP, or without a page.
         stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
+        ended_at: When motion was last stopped, or the rig went off [s, monotonic clock].
         compensation: Share of the compensation that the operator has chosen.
         is_recording: Whether a take is being recorded, with lossless images.
         while_opening: Called periodically, in another thread, while the rig opens: this takes
@@ -61,9 +63,11 @@ class RigControl:
         self.lease = Lease(self.images)
         self.operator = OperatorInput(config, self.lease)
         self.run: ControlRun | None = None
-        self.fault = ""
-        self.is_opening = self.is_recording = False
+        self.fault = self.unconfirmed = ""
+        self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
+        self.ended_at = -math.inf
+        self._warnings: set[str] = set()
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
         self.kinematics = build_kinematics(config) if config.dof else None
@@ -71,7 +75,6 @@ class RigControl:
         if isinstance(rig, HardwareRig):
             rig.warn = self._warn
         self._runs = 0
-        self._was_interrupted = False
         self._endings: list[threading.Thread] = []
 
     @property
@@ -82,21 +85,18 @@ class RigControl:
 
     def open(self) -> None:
         """Enable the rig and start a run; a STOP, or a page that is gone, interrupts it."""
-        self.fault, self.is_opening, self._was_interrupted = "", True, False
-        watching = threading.Thread(target=self._watch_opening, name="opening")
-        watching.start()
+        self.fault, self.is_opening, self.is_interrupted = "", True, False
         try:
-            sample = check_sample(self._rig.reset(), self.config)
+            sample = check_sample(reset_unless(self._rig, self._must_stop), self.config)
         except TautscopeError as error:
-            self.fault = str(error)
+            found = described(error)
+            if self.is_interrupted and EMERGENCY_STOP not in found:
+                found = INTERRUPTED
+            self._stop_motors(found)
+            return
         finally:
             self.is_opening = False
-            watching.join()
-        if self._was_interrupted:
-            self.fault = INTERRUPTED
-        if self.fault:
-            self._stop_motors(self.fault)
-            return
+        self.unconfirmed = ""
         self.operator.reset(np.array(sample.applied, np.float64))
         self._start_run(sample)
 
@@ -123,11 +123,23 @@ class RigControl:
     def stop(self, reason: str) -> None:
         """Stop motion until it is enabled; motors are quick-stopped."""
         self.operator.stop(reason)
-        self.stopped_at = time.monotonic()
+        self.stopped_at = self.ended_at = time.monotonic()
         if self.run is not None:
             self.run.note(reason)
             if self.is_hardware:
                 self.close(reason)
+
+    @property
+    def warnings(self) -> set[str]:
+        """The flags since the last acknowledgement, also of runs that have ended."""
+        latched = () if self.run is None else self.run.loop.supervision.latched
+        return self._warnings.union(latched)
+
+    def acknowledge(self) -> None:
+        """Forget the warnings."""
+        self._warnings.clear()
+        if self.run is not None:
+            self.run.loop.acknowledge()
 
     def note(self, text: str) -> None:
         """Write a note into the log, if there is one."""
@@ -155,7 +167,11 @@ class RigControl:
             elif self.is_hardware:
                 self._rig.close()
         except TautscopeError as error:
-            self.fault = f"{fault}; {error}" if fault else str(error)
+            self.unconfirmed = described(error)
+            self.fault = f"{fault}; {self.unconfirmed}" if fault else self.unconfirmed
+        if EMERGENCY_STOP in fault:
+            self.unconfirmed = fault
+        self.ended_at = time.monotonic()
 
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
@@ -182,19 +198,17 @@ class RigControl:
             self.run.log.warn(text)
 
     def _end(self, run: ControlRun) -> None:
-        """Close the log in the background, because the disk may be slow."""
+        """Keep the warnings, and close the log in the background, because the disk may be slow."""
+        self._warnings.update(run.loop.supervision.latched)
         thread = threading.Thread(target=run.log.close, name="closing")
         self._endings = [each for each in self._endings if each.is_alive()]
         self._endings.append(thread)
         thread.start()
 
-    def _watch_opening(self) -> None:
-        while self.is_opening:
-            self.while_opening()
-            operator = self.operator
-            is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
-            if self.is_hardware and not is_wanted:
-                self._was_interrupted = True
-                if isinstance(self._rig, HardwareRig):
-                    self._rig.interrupt()
-            time.sleep(_IDLE_PERIOD)
+    def _must_stop(self) -> bool:
+        """Whether the motors, which are being enabled, have to stop."""
+        self.while_opening()
+        operator = self.operator
+        is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
+        self.is_interrupted |= self.is_hardware and not is_wanted
+        return self.is_interrupted

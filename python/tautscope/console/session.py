@@ -16,7 +16,7 @@ from tautscope.console.publisher import Bands, Publisher, Update
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels
-from tautscope.errors import TautscopeError
+from tautscope.errors import TautscopeError, described
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
@@ -86,7 +86,7 @@ class Session:
             run.step()
         except TautscopeError as error:
             _LOG.warning("%s", error)
-            control.close(str(error))
+            control.close(described(error))
 
     def _show(
         self, run: ControlRun, updates: list[tuple[Frame | Measurement, Report, float]]

@@ -24,6 +24,7 @@ _EFFECTS = {
     Reaction.QUICK_STOP: "Quick stop",
     Reaction.DISABLE: "The motors are disabled",
 }
+_MAY_MOVE = "THE MOTORS MAY STILL MOVE"
 
 
 def session_state(control: RigControl, log: LogState, now: float) -> State:
@@ -44,6 +45,7 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     state.is_recording = control.is_recording
     state.refused = dict(operator.refused)
     state.stopped_at = control.stopped_at
+    state.latched = tuple((name, advice(name)) for name in by_urgency(control.warnings))
     if run is not None:
         _add_run(state, run)
         if control.config.dof:
@@ -70,7 +72,6 @@ def _add_run(state: State, run: ControlRun) -> None:
         state.width_std = known(2 * hysteresis.width_std)
     supervision = loop.supervision
     state.reaction, state.flags = str(supervision.reaction), supervision.flags
-    state.latched = tuple((name, advice(name)) for name in by_urgency(supervision.latched))
     state.lead = supervision.lead
     state.late = run.late, run.ticks
     if report is not None:
@@ -83,8 +84,14 @@ def _add_run(state: State, run: ControlRun) -> None:
 def _motion(control: RigControl) -> tuple[str, str]:
     """The kind of motion, and what is in force and why, in one line."""
     operator, run = control.operator, control.run
-    if control.is_opening:
+    if control.is_opening and control.is_interrupted:
+        reason = operator.stopped_by or "The page was away"
+        unended = "The rig's reset has not ended: use the emergency stop."
+        found = "stopped", f"{reason}. {unended}"
+    elif control.is_opening:
         found = "opening", "The motors are being enabled and move to the start position."
+    elif control.unconfirmed:
+        found = "unconfirmed", f"{_MAY_MOVE}: {control.unconfirmed}"
     elif operator.stopped_by:
         found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
     elif run is not None:
@@ -117,4 +124,8 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
 def _drives(control: RigControl) -> str:
     if not control.is_hardware:
         return "simulated"
+    if control.is_opening:
+        return "being enabled"
+    if control.unconfirmed:
+        return _MAY_MOVE
     return "enabled" if control.run is not None else "stopped, or off"

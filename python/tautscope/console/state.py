@@ -123,7 +123,8 @@ class State(Struct):
         mode: What is commanded.
         now: When it was made [s, monotonic clock].
         time: The rig's clock [s].
-        motion: ``off``, ``stopped``, ``held``, ``moving``, ``ready``.
+        motion: ``off``, ``opening``, ``stopped``, ``unconfirmed`` where the drives did not confirm
+            that, ``held``, ``moving``, ``ready``, or of a recording ``replay``.
         message: What is in force and why, in one line.
         reference, command, applied, delta_minus, delta_plus: (n,).
         tip: (n,) estimated; in profile ``paper`` that of the newest image, if this determined it.

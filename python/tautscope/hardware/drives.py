@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import DrivesConfig
 from tautscope.config.microcontroller import PROTOCOL
 from tautscope.config.servos import PORTS
-from tautscope.errors import DriveError, SignalError, StateError
+from tautscope.errors import EMERGENCY_STOP, DriveError, SignalError, StateError
 from tautscope.extras import require_extras
 from tautscope.hardware.cia402_drives import Cia402Drives
 from tautscope.hardware.drive_group import DriveGroup
@@ -295,5 +295,5 @@ def _require_confirmed(unconfirmed: list[str], what: str = "quick stop") -> None
         raise StateError(
             "; ".join(unconfirmed),
             f"{what} is not confirmed",
-            "Use the emergency stop: the motor may be moving",
+            f"{EMERGENCY_STOP}: the motor may be moving",
         )

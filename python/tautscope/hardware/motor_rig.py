@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import threading
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
@@ -23,8 +22,6 @@ from tautscope.loop.measurement import Measurement
 from tautscope.loop.rig import Sample
 
 _LOG = logging.getLogger(__name__)
-_WATCH_PERIOD = 0.005
-"""Time between two calls of `must_stop` [s]."""
 
 
 class MotorRig:
@@ -126,26 +123,6 @@ class MotorRig:
         self._sent.clear()
         self._ticks = 0
         return Sample(0.0, applied)
-
-    def reset_unless(self, must_stop: Callable[[], bool]) -> Sample:
-        """`reset`, which takes seconds; the motors are quick-stopped once `must_stop` is true.
-
-        It is called periodically in another thread; `reset` then raises `StateError`.
-        """
-        is_over = threading.Event()
-
-        def watch() -> None:
-            while not is_over.wait(_WATCH_PERIOD):
-                if must_stop():
-                    self.interrupt()
-
-        thread = threading.Thread(target=watch, name="opening")
-        thread.start()
-        try:
-            return self.reset()
-        finally:
-            is_over.set()
-            thread.join()
 
     def step(self, command: ArrayLike) -> Sample:
         """Send command (m,) [m or rad] in the next cycle; return when the drives answer.

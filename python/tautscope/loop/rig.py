@@ -5,6 +5,8 @@ A rig takes commands and returns samples. It owns the clock.
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -12,9 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
-from tautscope.errors import SignalError
+from tautscope.errors import SignalError, StateError
 from tautscope.loop.measurement import Measurement, Points, Pose, Tip
 from tautscope.loop.signal_checks import check_time
+
+_WATCH_PERIOD = 0.005
+"""Time between two calls of `must_stop` [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +97,37 @@ class Rig(Protocol):
     def close(self) -> None:
         """Stop the motors and release all resources; a second call does nothing."""
         ...
+
+
+def reset_unless(rig: Rig, must_stop: Callable[[], bool]) -> Sample:
+    """`rig.reset`, which may move motors for seconds, to be stopped once `must_stop` is true.
+
+    It is called periodically in another thread. A rig with a method `interrupt`, as `MotorRig`, is
+    quick-stopped at once; any other one is to be closed when its `reset` has ended.
+
+    Raises:
+        StateError: It was stopped; also other errors of `reset` may then be raised.
+    """
+    is_over, is_stopping = threading.Event(), threading.Event()
+    interrupt: Callable[[], None] = getattr(rig, "interrupt", lambda: None)
+
+    def watch() -> None:
+        while not is_over.wait(_WATCH_PERIOD):
+            if must_stop():
+                is_stopping.set()
+            if is_stopping.is_set():
+                interrupt()  # again and again: before the motors are open it has no effect
+
+    thread = threading.Thread(target=watch, name="opening")
+    thread.start()
+    try:
+        sample = rig.reset()
+    finally:
+        is_over.set()
+        thread.join()
+    if is_stopping.is_set():
+        raise StateError("rig", "stopped while it was being enabled", "Enable it again")
+    return sample
 
 
 def check_sample(sample: Sample, config: Config) -> Sample:

@@ -14,13 +14,13 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
-from tautscope.errors import ConfigError, MessageError, TautscopeError
+from tautscope.errors import ConfigError, MessageError, TautscopeError, described
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
-from tautscope.loop.rig import Frame, Rig
+from tautscope.loop.rig import Frame, Rig, reset_unless
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
@@ -130,7 +130,7 @@ class NodeControl:
                 self._telemetry.update(run, source, report)
             self._telemetry.tick(run)
             supervision = run.loop.supervision
-            share = supervision.lead * float(self.parameters["compensation"])
+            share = supervision.lead * run.compensation
             self._achieved.add_tick(run.sample, run.reference, run.command, share)
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
                 self._is_disabling = supervision.reaction is Reaction.DISABLE
@@ -139,7 +139,7 @@ class NodeControl:
             run.step()
             self._add_measurements(run)
         except TautscopeError as error:
-            self._fail(str(error))
+            self._fail(described(error))
 
     @property
     def operating_state(self) -> OperatingState:
@@ -161,7 +161,7 @@ class NodeControl:
 
     def _set_compensation(self, share: float) -> None:
         if self.run is not None:
-            self.run.loop.set_compensation(share)
+            self.run.set_compensation(share)
 
     def _take_command(self) -> str | None:
         try:
@@ -201,9 +201,9 @@ class NodeControl:
                 if transition.goal in (State.UNCONFIGURED, State.FINALIZED):
                     self._release_rig()
         except TautscopeError as error:
-            self.fault, self._states.goal = str(error), OperatingState.FAULT
-            _LOG.warning("%s", error)
-            self._telemetry.warn(str(error))
+            self.fault, self._states.goal = described(error), OperatingState.FAULT
+            _LOG.warning("%s", self.fault)
+            self._telemetry.warn(self.fault)
             if transition is ACTIVATE and self._rig is not None:
                 self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.
@@ -225,11 +225,9 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
-        if isinstance(rig, HardwareRig):
-            sample = rig.reset_unless(self._is_stopped)
-            monitor = partial(PlausibilityMonitor, self._config)
-        else:
-            sample, monitor = rig.reset(), None
+        sample = reset_unless(rig, self._is_stopped)
+        is_article = isinstance(rig, HardwareRig)
+        monitor = partial(PlausibilityMonitor, self._config) if is_article else None
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1

@@ -94,7 +94,7 @@ class Telemetry:
         self._offsets.publish(messages.offsets(self._joints, report))
         supervision = run.loop.supervision
         self._mode.publish(messages.text(str(supervision.reaction)))
-        self._compensation.publish(messages.number(supervision.lead))
+        self._compensation.publish(messages.number(run.compensation * supervision.lead))
         if not isinstance(source, Frame):
             return
         self._camera_info.publish(messages.camera_info(captured, self._config.camera))

@@ -88,7 +88,7 @@ Tick ControlLoop::step(double time) noexcept {
     double made_at = made_at_;
     const bool is_resting = goal_ == OperatingState::paused || goal_ == OperatingState::fault;
     if (is_resting || is_clutching_) {
-        if (is_clutching_ && !is_resting && has_new_reference_) {
+        if (is_clutching_ && !is_resting && has_new_reference_ && is_finite(command_)) {
             // Where the operator is now is where the motion continues.
             tautscope_loop_engage(loop_.handle());
             is_clutching_ = false;
@@ -128,7 +128,7 @@ bool ControlLoop::set_compensation(double share) noexcept {
 Status ControlLoop::status() const noexcept {
     return {published_state_.load(std::memory_order_relaxed), reaction_.load(std::memory_order_relaxed),
             flags_.load(std::memory_order_relaxed), latched_.load(std::memory_order_relaxed),
-            published_misplaced_.load(std::memory_order_relaxed)};
+            published_misplaced_.load(std::memory_order_relaxed), published_unmeasured_.load(std::memory_order_relaxed)};
 }
 
 void ControlLoop::apply_requests(double time) noexcept {
@@ -142,6 +142,7 @@ void ControlLoop::apply_requests(double time) noexcept {
         }
         if (contains(requests, command.request) && ((command.states >> static_cast<unsigned>(state_)) & 1U) != 0) {
             goal_ = command.goal;
+            is_unmeasured_ = false;
             if (command.request == Request::enable) {
                 enable();
                 engaged_at_ = time;
@@ -158,24 +159,27 @@ void ControlLoop::apply_requests(double time) noexcept {
 }
 
 void ControlLoop::enable() noexcept {
-    if (is_finite(command_)) {
-        for (std::size_t i = 0; i < command_.size() && is_finite(measured_); ++i) {
-            if (std::abs(measured_[i] - command_[i]) > start_tolerance_[i]) {
-                goal_ = OperatingState::fault;
-                return;
-            }
-        }
-        engage();
-    } else if (is_finite(measured_)) {
-        // The first reference passes: the command begins where the drives are.
-        used_ = measured_;
-        is_clutching_ = true;
+    if (!is_finite(measured_)) {
+        goal_ = OperatingState::disabled;
+        is_unmeasured_ = true;
+        return;
     }
+    for (std::size_t i = 0; i < command_.size() && is_finite(command_); ++i) {
+        if (std::abs(measured_[i] - command_[i]) > start_tolerance_[i]) {
+            goal_ = OperatingState::fault;
+            return;
+        }
+    }
+    if (!is_finite(command_)) {
+        // The loop passes its first reference: the command begins where the drives are.
+        used_ = measured_;
+    }
+    engage();
 }
 
 void ControlLoop::engage() noexcept {
     tautscope_loop_engage(loop_.handle());
-    is_clutching_ = is_finite(command_);
+    is_clutching_ = true;
 }
 
 void ControlLoop::update_state() noexcept {
@@ -189,6 +193,7 @@ void ControlLoop::update_state() noexcept {
     flags_.store(now.flags, std::memory_order_relaxed);
     latched_.store(now.latched, std::memory_order_relaxed);
     published_misplaced_.store(goal_ == OperatingState::fault, std::memory_order_relaxed);
+    published_unmeasured_.store(is_unmeasured_, std::memory_order_relaxed);
 }
 
 } // namespace tautscope_control

@@ -76,6 +76,10 @@ public:
             measured[i] = read(state_interfaces_[i]).value_or(unknown);
             reference_interfaces_[i] = unknown;
         }
+        if (std::any_of(measured.begin(), measured.end(), [](double value) { return !std::isfinite(value); })) {
+            RCLCPP_ERROR(get_node()->get_logger(), "It is not known where the drives are: a state interface has no number");
+            return CallbackReturn::FAILURE;
+        }
         used_message_ = received_.readFromRT()->number;
         // What was measured before is dropped.
         session_->control().exchange();

@@ -46,7 +46,7 @@ public:
         });
         actuators_measured_ =
             create_subscription<JointState>("actuators/measured_js", latest, [this](const JointState &message) {
-                if (rclcpp::Time(message.header.stamp).nanoseconds() != 0) {
+                if (nanoseconds(message.header.stamp) != 0) {
                     session_->control().set_measured(positions(message, session_->joints()));
                 }
             });
@@ -63,6 +63,9 @@ public:
 
     CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
         last_ = OperatingState::disabled;
+        // What was requested before is not executed now.
+        session_->control().post(Request::disable);
+        session_->control().step(session_->now());
         const auto period = rclcpp::Duration::from_seconds(session_->control().period());
         tick_ = rclcpp::create_timer(this, get_clock(), period, [this] { tick(); });
         report_ = rclcpp::create_timer(this, get_clock(), rclcpp::Duration::from_seconds(0.1), [this] { report(); });

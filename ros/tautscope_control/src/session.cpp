@@ -30,9 +30,14 @@ std_msgs::msg::MultiArrayDimension dimension(const std::string &label, std::uint
     return dimension;
 }
 
+bool is_refused(const Status &status) { return status.is_misplaced || status.is_unmeasured; }
+
 std::string description(const Status &status) {
     if (status.is_misplaced) {
         return "the drives are not where the last command was: clean up and configure again";
+    }
+    if (status.is_unmeasured) {
+        return "enable is refused: it is not known where the drives are";
     }
     return std::string(tautscope_reaction_name(status.reaction)) + ": " + flag_names(status.flags | status.latched);
 }
@@ -119,8 +124,7 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefi
         node.get_parameter("image_topic").as_string(), rclcpp::SensorDataQoS().keep_last(1),
         [worker = std::weak_ptr<DetectionWorker>(worker_), origin = origin_, logger = logger_,
          clock = clock_](sensor_msgs::msg::Image::ConstSharedPtr message) {
-            const rclcpp::Time stamp(message->header.stamp, origin.get_clock_type());
-            const double captured_at = 1e-9 * static_cast<double>((stamp - origin).nanoseconds());
+            const double captured_at = 1e-9 * static_cast<double>(nanoseconds(message->header.stamp) - origin.nanoseconds());
             auto received = image(message, captured_at);
             if (!received) {
                 RCLCPP_ERROR_THROTTLE(logger, *clock, 1000, "Image not used: encoding %s", message->encoding.c_str());
@@ -139,9 +143,8 @@ Session::~Session() {
 }
 
 double Session::seconds(const builtin_interfaces::msg::Time &stamp) const {
-    const rclcpp::Time now = clock_->now();
-    const rclcpp::Time time(stamp, now.get_clock_type());
-    return seconds(time.nanoseconds() == 0 ? now : std::min(time, now));
+    const std::int64_t now = clock_->now().nanoseconds(), time = nanoseconds(stamp);
+    return seconds(time == 0 ? now : std::min(time, now));
 }
 
 sensor_msgs::msg::JointState Session::joint_state() const {
@@ -176,7 +179,7 @@ template <class Report> void Session::on_report(const Report &report) {
 void Session::on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor) {
     publish_reports();
     const Values values = positions(message, control_.dofs());
-    const double captured_at = seconds(rclcpp::Time(message.header.stamp, origin_.get_clock_type()));
+    const double captured_at = seconds(nanoseconds(message.header.stamp));
     const bool is_known = std::any_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
     ++counts_.arrived;
     counts_.refused += is_known && control_.detection().measurements.push({values, captured_at, sensor}) ? 0 : 1;
@@ -197,8 +200,8 @@ void Session::report() {
     if (has_changed || reports_ % reports_per_second == 0) {
         publish_state(status, now);
     }
-    const bool has_warning = status.is_misplaced || status.latched != 0 || status.flags != 0;
-    if (has_warning && (status.flags != last_.flags || status.latched != last_.latched || status.is_misplaced != last_.is_misplaced)) {
+    const bool has_warning = is_refused(status) || status.latched != 0 || status.flags != 0;
+    if (has_warning && (status.flags != last_.flags || status.latched != last_.latched || is_refused(status) != is_refused(last_))) {
         std_msgs::msg::String warning;
         warning.data = description(status);
         warning_->publish(warning);
@@ -207,7 +210,7 @@ void Session::report() {
     if (has_changed || reports_ % reports_per_second == 0) {
         publish_diagnostics(status, now);
     }
-    if (seconds(now) - measured_at_ > measured_timeout) {
+    if (seconds(now.nanoseconds()) - measured_at_ > measured_timeout) {
         measured_->publish(joint_state());
     }
     last_ = status;
@@ -229,8 +232,8 @@ void Session::publish_diagnostics(const Status &status, const rclcpp::Time &now)
     Level about;
     about.name = name_ + ": hysteresis reduction";
     about.hardware_id = frame_id_;
-    about.message = status.flags == 0 && !status.is_misplaced ? name(status.state) : description(status);
-    about.level = status.is_misplaced || status.reaction >= TAUTSCOPE_REACTION_HOLD_MOTION ? Level::ERROR
+    about.message = status.flags == 0 && !is_refused(status) ? name(status.state) : description(status);
+    about.level = is_refused(status) || status.reaction >= TAUTSCOPE_REACTION_HOLD_MOTION ? Level::ERROR
                   : status.flags != 0 || status.latched != 0                               ? Level::WARN
                                                                                           : Level::OK;
     const ImageCounts counts = worker_ ? worker_->counts() : counts_;

@@ -98,7 +98,7 @@ public:
         }
     }
 
-    void activate(bool is_chained) {
+    void activate(bool is_chained, std::uint8_t expected = State::PRIMARY_STATE_ACTIVE) {
         EXPECT(controller_->set_chained_mode(is_chained));
         std::vector<LoanedCommandInterface> commands;
         std::vector<LoanedStateInterface> states;
@@ -115,7 +115,7 @@ public:
             states.emplace_back(read, nullptr);
         }
         controller_->assign_interfaces(std::move(commands), std::move(states));
-        EXPECT(controller_->get_node()->activate().id() == State::PRIMARY_STATE_ACTIVE);
+        EXPECT(controller_->get_node()->activate().id() == expected);
     }
 
     void deactivate() {
@@ -195,6 +195,8 @@ void chained_references_give_the_commands_of_the_loop(Loader &loader, const std:
     rig.refer(ticks[13000].reference);
     EXPECT(rig.update(13001 * 1000000LL) == return_type::ERROR && rig.command == rest);
     rig.deactivate();
+    rig.measured[0] = std::nan("");
+    rig.activate(true, State::PRIMARY_STATE_INACTIVE);
     rig.measured = rig.command;
     rig.activate(true);
     EXPECT(rig.update(13002 * 1000000LL) == return_type::OK && rig.command == rest);

@@ -49,6 +49,7 @@ struct Recorded {
 int in_turn(const Recorded &recorded) {
     ControlLoop control(recorded.toml);
     tautscope::Detector detector(recorded.toml);
+    control.set_measured(recorded.ticks.at(0).reference);
     control.post(Request::enable);
     std::size_t wrong = 0, image = 0;
     unsigned long allocated = 0;
@@ -96,6 +97,7 @@ int in_two_threads(const Recorded &recorded) {
                 found += report.status == TAUTSCOPE_STATUS_OK;
             },
             [](const std::string &error) { std::printf("%s\n", error.c_str()); });
+        control.set_measured(recorded.ticks.at(0).reference);
         control.post(Request::enable);
         auto next = std::chrono::steady_clock::now();
         std::size_t image = 0;

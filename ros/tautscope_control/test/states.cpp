@@ -21,7 +21,7 @@ bool operator==(const Values &a, const Values &b) { return std::equal(a.begin(),
 
 /// A loop with its clock, and an operator who moves the insertion at 10 mm/s.
 struct Rig {
-    explicit Rig(const std::string &toml) : control(toml) {}
+    explicit Rig(const std::string &toml) : control(toml) { control.set_measured(start); }
 
     /// Ticks without a word from the operator.
     Tick wait(double duration) {
@@ -60,8 +60,8 @@ void disabled_until_enabled(const std::string &toml) {
     EXPECT(!tick.is_sent && tick.state == OperatingState::disabled);
     rig.control.post(Request::enable);
     tick = rig.wait(0.1);
-    // Nothing to send before the first reference.
-    EXPECT(!tick.is_sent && tick.state == OperatingState::enabled);
+    // Where the drives are, before the first reference.
+    EXPECT(tick.is_sent && tick.command == Values(start) && tick.state == OperatingState::enabled);
     tick = rig.move(0.1);
     EXPECT(tick.is_sent && tick.command[0] > start[0]);
     rig.control.post(Request::disable);
@@ -136,7 +136,9 @@ void a_drive_fault_stops_the_drives(const std::string &toml) {
     EXPECT(!tick.is_sent && tick.state == OperatingState::fault);
     EXPECT(rig.control.status().reaction == TAUTSCOPE_REACTION_QUICK_STOP);
     rig.control.post(Request::resume);
-    EXPECT(rig.wait(0.01).state == OperatingState::fault);
+    tick = rig.wait(0.01);
+    EXPECT(tick.state == OperatingState::fault);
+    rig.control.set_measured(tick.command);
     rig.largest_step = 0.0;
     rig.control.post(Request::enable);
     tick = rig.move(0.5);
@@ -169,12 +171,46 @@ void motion_begins_where_the_drives_are(const std::string &toml) {
     EXPECT(!tick.is_sent && tick.state == OperatingState::fault && rig.control.status().is_misplaced);
 }
 
+void the_first_reference_is_where_the_operator_is(const std::string &toml) {
+    for (const bool is_resumed : {false, true}) {
+        for (const bool is_chained : {false, true}) {
+            Rig rig(toml);
+            rig.control.post(Request::enable);
+            if (is_resumed) {
+                rig.control.post(Request::pause);
+                rig.control.step(rig.time - 1.0);
+                rig.control.post(Request::resume);
+            }
+            rig.reference = {45e-3, 1.5, 0.2};
+            for (int tick = 0; tick < 20; ++tick) {
+                // A reference of each tick, made in it.
+                rig.control.set_reference(rig.reference, is_chained ? nan : rig.time);
+                const Tick rest = rig.wait(rig.control.period() / 2);
+                EXPECT(rest.is_sent && rest.command == Values(start));
+            }
+            rig.move(0.5);
+            EXPECT(rig.last_motion > rig.time - 2 * rig.control.period() && rig.largest_step < 1e-3);
+        }
+    }
+}
+
+void enable_is_refused_while_it_is_not_known_where_the_drives_are(const std::string &toml) {
+    ControlLoop control(toml);
+    control.set_measured({nan, 0.0, 0.9});
+    control.post(Request::enable);
+    control.set_reference(start, 0.0);
+    EXPECT(!control.step(0.0).is_sent && control.status().state == OperatingState::disabled && control.status().is_unmeasured);
+    control.set_measured(start);
+    control.post(Request::enable);
+    EXPECT(control.step(0.005).is_sent && !control.status().is_unmeasured);
+}
+
 void a_reference_from_before_neither_begins_nor_stops_a_motion(const std::string &toml) {
     Rig rig(toml);
     rig.control.post(Request::enable);
     rig.control.set_reference(start, rig.time - 1.0);
     Tick tick = rig.wait(0.5);
-    EXPECT(!tick.is_sent && tick.state == OperatingState::enabled);
+    EXPECT(tick.is_sent && tick.command == Values(start) && tick.state == OperatingState::enabled);
     rig.move(0.5);
     rig.control.post(Request::pause);
     rig.wait(0.5);
@@ -213,6 +249,8 @@ int main(int count, char **arguments) try {
     a_pause_holds_until_resumed(toml);
     a_drive_fault_stops_the_drives(toml);
     motion_begins_where_the_drives_are(toml);
+    the_first_reference_is_where_the_operator_is(toml);
+    enable_is_refused_while_it_is_not_known_where_the_drives_are(toml);
     a_reference_from_before_neither_begins_nor_stops_a_motion(toml);
     what_is_not_finite_changes_nothing(toml);
     state_commands_are_those_of_crtk();

@@ -55,6 +55,7 @@ void commands_and_estimates_are_those_of_python(const std::string &recording) {
     EXPECT(!control.has_bands() && control.dofs() == (std::vector<std::string>{"bend", "slide"}));
     const auto ticks = read_rows<TipTick>(recording + ".ticks");
     const auto updates = read_rows<TipUpdate>(recording + ".images");
+    control.set_measured(ticks.at(0).reference);
     control.post(Request::enable);
     std::size_t wrong = 0, update = 0;
     const unsigned long allocated = allocations::count;
@@ -107,6 +108,7 @@ void measurements_come_from_another_thread(const std::string &recording) {
         const std::size_t next = seen;
         return next < updates.size() && updates[next].tick + 100.0 < static_cast<double>(tick);
     };
+    control.set_measured(ticks.at(0).reference);
     control.post(Request::enable);
     for (const TipTick &now : ticks) {
         control.set_reference(now.reference, now.made_at);
@@ -133,6 +135,7 @@ void wrong_measurements_change_nothing(const std::string &recording) {
     control.exchange();
     // Nothing controls.
     EXPECT(!has_report(control));
+    control.set_measured(good.values);
     control.post(Request::enable);
     EXPECT(!control.set_reference(Numbers{0.1}, 0.0) && !control.set_reference(Numbers{0.1, std::nan("")}, 0.0));
     EXPECT(control.set_reference(Numbers{0.1, 1e-3}, 0.0) && control.step(0.0).is_sent);

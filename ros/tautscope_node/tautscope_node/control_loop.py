@@ -26,7 +26,7 @@ class Tick:
     """Result of a control tick.
 
     Attributes:
-        command: (n,) [m or rad]; NaN before the first reference.
+        command: (n,) [m or rad]; NaN before it was enabled.
         is_sent: Whether the command is to be sent to the drives.
         state: The operating state.
     """
@@ -48,6 +48,7 @@ class ControlLoop:
 
     Attributes:
         loop: The loop itself.
+        is_unmeasured: Whether enabling was refused: it is not known where the drives are.
         reference: The newest reference that went into the loop (n,) [m or rad]; NaN before.
     """
 
@@ -65,12 +66,16 @@ class ControlLoop:
         self._measured: Floats | None = None
         self._next: tuple[Floats, float | None] | None = None
         self._made_at: float | None = None
+        self.is_unmeasured = False
         self._is_clutching = False
         self._is_engaging = False
         self._engaged_at = -math.inf
 
     def set_measured(self, position: Sequence[float] | Floats) -> None:
-        """Position of the drives (n,) [m or rad]; values that are not finite are ignored."""
+        """Position of the drives (n,) [m or rad], without which `enable` is refused.
+
+        Values that are not finite are ignored.
+        """
         if np.isfinite(position).all():
             self._measured = np.array(position, np.float64)
 
@@ -95,7 +100,8 @@ class ControlLoop:
             self._made_at = new[1]
         made_at = self._made_at
         is_resting = self._states.goal in (OperatingState.PAUSED, OperatingState.FAULT)
-        if self._is_clutching and not is_resting and new is not None:
+        has_command = bool(np.isfinite(self._command).all())
+        if self._is_clutching and not is_resting and new is not None and has_command:
             # Where the operator is now is where the motion continues.
             self.loop.engage()
             self._is_clutching = False
@@ -132,6 +138,7 @@ class ControlLoop:
             self.loop.acknowledge()
         elif command in STATE_COMMANDS:
             is_accepted = self._states.accept(command, self.supervision.reaction)
+            self.is_unmeasured &= not is_accepted
             if is_accepted and command == "enable":
                 self._enable()
             elif is_accepted and command == "resume":
@@ -142,19 +149,16 @@ class ControlLoop:
 
     def _enable(self) -> None:
         """Begin where the drives are; nothing moves before the next reference."""
-        has_command = bool(np.isfinite(self._command).all())
-        if has_command and self._measured is not None:
-            distance = np.abs(self._measured - self._command)
-            if (distance > self._start_tolerance).any():
-                self._states.goal = OperatingState.FAULT
-                return
-        self._is_engaging = True
-        if has_command:
-            self._engage()
-        elif self._measured is not None:
-            # The first reference passes: the command begins where the drives are.
+        if self._measured is None:
+            self._states.goal, self.is_unmeasured = OperatingState.DISABLED, True
+            return
+        if not np.isfinite(self._command).all():
+            # The loop passes its first reference: the command begins where the drives are.
             self.reference = self._measured
-            self._is_clutching = True
+        elif (np.abs(self._measured - self._command) > self._start_tolerance).any():
+            self._states.goal = OperatingState.FAULT
+            return
+        self._engage()
 
     def raise_drive_fault(self) -> None:
         """Stop: a drive reports a fault."""
@@ -178,5 +182,4 @@ class ControlLoop:
 
     def _engage(self) -> None:
         self.loop.engage()
-        self._is_engaging = True
-        self._is_clutching = bool(np.isfinite(self._command).all())
+        self._is_engaging = self._is_clutching = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -46,6 +47,8 @@ from tautscope_node.status import REPORT_PERIOD, StatusPublisher
 
 MEASURED_TIMEOUT = 0.2
 """Without a used measurement for this long, `measured_js` is invalid [s]."""
+MOST_MEASUREMENTS = 64
+"""The newest ones that wait for a tick are used; without ticks no more are kept."""
 LATEST = QoSProfile(depth=1)
 COMMANDS = QoSProfile(depth=10)
 IMAGES, MEASUREMENTS = (
@@ -102,7 +105,7 @@ class InstrumentNode(LifecycleNode):
         self._origin = self.get_clock().now().nanoseconds
         self._frame_id = self.get_parameter("frame_id").value
         self._newest: Frame | None = None
-        self._measurements: list[Measurement] = []
+        self._measurements: deque[Measurement] = deque(maxlen=MOST_MEASUREMENTS)
         self._sequence = 0
         self._arrived = self._replaced = self._used = 0
         self._measured_at = -1.0
@@ -113,6 +116,7 @@ class InstrumentNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start the ticks; the state command `enable` starts the motion."""
         assert self._control is not None
+        self._control.request("disable")  # what was requested before is not executed now
         self._last_state = OperatingState.DISABLED
         self._achieved = Achieved(self._config)
         self._session_timers = [
@@ -281,7 +285,8 @@ class InstrumentNode(LifecycleNode):
         self._last_state = tick.state
         # After the command, which never waits for an image.
         frame, self._newest = self._newest, None
-        measurements, self._measurements = self._measurements, []
+        measurements = list(self._measurements)
+        self._measurements.clear()
         for seen, report in control.exchange(frame, measurements):
             self._achieved.add_update(now, seen, report)
             self._used += 1

@@ -59,11 +59,14 @@ class StatusPublisher:
         """
         supervision = control.supervision
         flags = tuple(dict.fromkeys((*supervision.flags, *supervision.latched)))
-        warned = (supervision.flags, supervision.latched, control.is_misplaced)
-        has_warning = bool(flags) or control.is_misplaced
+        is_refused = control.is_misplaced or control.is_unmeasured
+        warned = (supervision.flags, supervision.latched, is_refused)
+        has_warning = bool(flags) or is_refused
         text = f"{supervision.reaction}: {', '.join(flags)}"
         if control.is_misplaced:
             text = "the drives are not where the last command was: clean up and configure again"
+        elif control.is_unmeasured:
+            text = "enable is refused: it is not known where the drives are"
         if has_warning and warned != self._warned:
             self._warning.publish(String(data=text))
             self._node.get_logger().warning(text)
@@ -79,7 +82,8 @@ class StatusPublisher:
     ) -> None:
         supervision = control.supervision
         level = DiagnosticStatus.OK
-        if supervision.reaction.rank >= Reaction.HOLD_MOTION.rank or control.is_misplaced:
+        is_refused = control.is_misplaced or control.is_unmeasured
+        if supervision.reaction.rank >= Reaction.HOLD_MOTION.rank or is_refused:
             level = DiagnosticStatus.ERROR
         elif supervision.flags or supervision.latched or problem:
             level = DiagnosticStatus.WARN

@@ -35,8 +35,9 @@ export class Link {
     return this.socket.readyState === WebSocket.OPEN;
   }
 
-  /** Send a message, if the connection is open; a message is never kept for later. */
+  /** Send a message, if the connection is open, and say whether it is; a message is never kept for later. */
   send(message) {
     if (this.isOpen) this.socket.send(JSON.stringify(message));
+    return this.isOpen;
   }
 }

@@ -11,9 +11,10 @@ import { Steering, isText } from "./steer.js";
 const LOST = 500; // ms without a state, or without an image
 const MODES = { twin: "SIMULATED", hardware: "REAL MOTORS", replay: "RECORDING" };
 const WORDS = {
-  ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", off: "OFF", opening: "ENABLING", lost: "NO DATA",
-  replay: "REPLAY",
+  ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", unconfirmed: "MAY MOVE", off: "OFF",
+  opening: "ENABLING", lost: "NO DATA", replay: "REPLAY",
 };
+const RESTING = ["stopped", "unconfirmed", "held", "off"]; // until Enable
 
 const $ = (id) => document.getElementById(id);
 document.body.classList.toggle("viewing", new URLSearchParams(location.search).has("view"));
@@ -52,7 +53,9 @@ function reply(text, isRefused) {
 
 /** Go to a time of a recording, or stay, and play on or not. */
 const seek = (time, isPlaying) => control.send({ type: "seek", time, is_playing: isPlaying });
-const stop = () => control.send({ type: "stop" });
+const stop = () => {
+  if (!control.send({ type: "stop" })) reply("STOP was NOT sent: no connection. Use the emergency stop.", true);
+};
 
 const control = new Link("/control", token, {
   onMessage(data) {
@@ -62,6 +65,8 @@ const control = new Link("/control", token, {
       if (!layout) build(message.layout);
     } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
+      // An element with the focus does not show the state, which is another than asked for.
+      if (!isAccepted && !isText(document.activeElement)) document.activeElement?.blur();
       reply(`${what}: ${isAccepted ? "done" : "refused"}${reason && `, ${reason}`}`, !isAccepted);
     } else {
       state = { ...message.state, latency: message.latency };
@@ -127,7 +132,7 @@ function controlsOf({ name }, k) {
   $("dofs").insertAdjacentHTML("beforeend", `<span>${name}</span><span><kbd></kbd><span class="touch">
     <button aria-label="${name} backwards">−</button> <button aria-label="${name} forwards">+</button></span></span>
     <input type="range" min="0.05" max="1" step="0.05" aria-label="scale of ${name}"><output></output>
-    <label><input type="checkbox" checked> clutch</label>`);
+    <label><input type="checkbox" checked aria-label="clutch of ${name}"> clutch</label>`);
   const last = (selector) => [...$("dofs").querySelectorAll(selector)].at(-1);
   const [clutch, scale, output, keys] = ["[type=checkbox]", "[type=range]", "output", "kbd"].map(last);
   [...last(".touch").children].forEach((button, side) => steering.bind(button, k, 2 * side - 1));
@@ -223,14 +228,14 @@ function showControls() {
   $("score").textContent = state.score.some(Boolean)
     ? `Last minute: ${shares} less error than without (by ${state.uncompensated_by}).`
     : "Move for a second to compare with the tip without compensation.";
-  $("enable").disabled ||= !["stopped", "held", "off"].includes(state.motion);
+  $("enable").disabled ||= !RESTING.includes(state.motion);
   $("hint").textContent = hint();
 }
 
 function hint() {
   if (!hasLease()) return "Take control to steer. Others watch; everybody may stop.";
   if (!steering.isActive) return "This page does not have the focus: nothing moves.";
-  if (["stopped", "held", "off"].includes(state.motion)) return "Press Enable; then hold a key to move.";
+  if (RESTING.includes(state.motion)) return "Press Enable; then hold a key to move.";
   if (state.rested_by) return `Motion ended: ${state.rested_by}. Let go, then hold again.`;
   if (state.is_off_centre) return "A stick of the gamepad is off centre: let go of it. If it stays, unplug the gamepad: it is worn.";
   if (isText(document.activeElement)) return "Keys write into the text field; click beside it to steer by them.";
@@ -260,7 +265,7 @@ function update() {
   const now = isLost ? "lost" : state.motion;
   if (now !== motion) {
     if (now === "lost") sound.play("lost");
-    if (["stopped", "held", "off"].includes(now)) sound.play("stopped");
+    if (RESTING.includes(now)) sound.play("stopped");
     motion = document.body.dataset.motion = now;
     $("motion").textContent = WORDS[now];
   }
@@ -269,7 +274,7 @@ function update() {
   const isOld = performance.now() - view.drawnAt > LOST;
   $("stale").hidden = !isOld || !hasImage || (!isLost && state.replay !== null && !state.replay[2]);
   if (isLost) {
-    $("message").textContent = "No data from the control process. Motion has stopped; use the emergency stop if not.";
+    $("message").textContent = "No data from the control process. What this page moved rests; another page may steer. If in doubt, use the emergency stop.";
     return;
   }
   $("message").textContent = state.message;
@@ -281,6 +286,8 @@ function update() {
   showWarnings();
   showLease();
   showControls();
+  // In Firefox it would swallow every key, also Escape.
+  if (document.activeElement?.disabled) document.activeElement.blur();
   showTime();
   showPointing();
   facts();

@@ -43,6 +43,7 @@ export class Steering {
       this.onStop();
       return;
     }
+    if (event.metaKey) this.pressed.clear(); // macOS does not tell which keys are released meanwhile
     if (isText(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
     const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
     if (digit) this.pick(Number(digit[1]) - 1);

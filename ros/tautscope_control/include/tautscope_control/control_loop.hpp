@@ -28,7 +28,7 @@ std::optional<Request> parse_state_command(std::string_view text) noexcept;
 
 /// Result of a control tick.
 struct Tick {
-    /// (n,) [m or rad]; NaN before the first reference.
+    /// (n,) [m or rad]; NaN before it was enabled.
     Values command;
     /// Whether the command is to be sent to the drives.
     bool is_sent;
@@ -45,6 +45,8 @@ struct Status {
     std::uint32_t latched;
     /// Whether enabling was refused: the drives were not where the last command was.
     bool is_misplaced;
+    /// Whether enabling was refused: it is not known where the drives are.
+    bool is_unmeasured;
 };
 
 /// The names of flags, separated by commas.
@@ -68,7 +70,8 @@ public:
     /// The control period [s].
     double period() const noexcept { return period_; }
 
-    /// Position of the drives (n,) [m or rad], before `enable`; ignored unless n numbers are finite.
+    /// Position of the drives (n,) [m or rad], where the command begins; without one `enable` is refused. Ignored unless n numbers
+    /// are finite.
     void set_measured(Numbers position) noexcept;
 
     /// The newest reference (n,) [m or rad], made at `made_at` [s], NaN if that is not known; ignored likewise, and then false.
@@ -116,10 +119,11 @@ private:
     /// When motion was last enabled or resumed [s].
     double engaged_at_;
     bool has_new_reference_ = false;
-    /// The next new reference is where the motion begins, wherever it is.
+    /// The next new reference after a command is where the motion begins, wherever it is.
     bool is_clutching_ = false;
     /// The state that was asked for; `fault` if the drives were elsewhere when they should have been enabled.
     OperatingState goal_ = OperatingState::disabled;
+    bool is_unmeasured_ = false;
     /// The state, which the supervisor may require to be a later one.
     OperatingState state_ = OperatingState::disabled;
     double share_ = 1.0;
@@ -128,7 +132,7 @@ private:
     std::atomic<OperatingState> published_state_{OperatingState::disabled};
     std::atomic<TautscopeReaction> reaction_{TAUTSCOPE_REACTION_NONE};
     std::atomic<std::uint32_t> flags_{0}, latched_{0};
-    std::atomic<bool> published_misplaced_{false};
+    std::atomic<bool> published_misplaced_{false}, published_unmeasured_{false};
 };
 
 } // namespace tautscope_control

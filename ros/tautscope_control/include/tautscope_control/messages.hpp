@@ -3,6 +3,7 @@
 #ifndef TAUTSCOPE_CONTROL__MESSAGES_HPP_
 #define TAUTSCOPE_CONTROL__MESSAGES_HPP_
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,11 @@ inline const std::vector<std::string> default_joints{"insertion", "rotation", "b
 /// The joints' names by the parameter; of a robot with `[[dof]]` by default those of its degrees of freedom. Throws
 /// `std::invalid_argument` unless they are different, one per degree of freedom.
 std::vector<std::string> joints_of(std::vector<std::string> names, const ControlLoop &control);
+
+/// A stamp in ns, which may be negative: `rclcpp::Time` throws then.
+inline std::int64_t nanoseconds(const builtin_interfaces::msg::Time &stamp) noexcept {
+    return stamp.sec * 1'000'000'000LL + stamp.nanosec;
+}
 
 /// Positions of the joints, by their names; by their order where the message has no names. NaN for one that is missing.
 Values positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints);

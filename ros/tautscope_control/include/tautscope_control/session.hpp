@@ -4,6 +4,7 @@
 #define TAUTSCOPE_CONTROL__SESSION_HPP_
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,7 +48,7 @@ public:
     const std::vector<std::string> &joints() const noexcept { return joints_; }
 
     /// Seconds since the session began, on the node's clock.
-    double now() const { return seconds(clock_->now()); }
+    double now() const { return seconds(clock_->now().nanoseconds()); }
 
     /// Seconds since the session began of the stamp of a message; of now, if it has none or one of the future.
     double seconds(const builtin_interfaces::msg::Time &stamp) const;
@@ -61,7 +62,7 @@ public:
 private:
     Session(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefix);
 
-    double seconds(const rclcpp::Time &time) const { return 1e-9 * static_cast<double>((time - origin_).nanoseconds()); }
+    double seconds(std::int64_t nanoseconds) const { return 1e-9 * static_cast<double>(nanoseconds - origin_.nanoseconds()); }
     template <class Report> void on_report(const Report &report);
     void on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor);
     void publish_reports();
@@ -82,7 +83,7 @@ private:
     rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
     /// When an image was last used [s].
     std::atomic<double> measured_at_{-1.0};
-    Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false};
+    Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false, false};
     int reports_ = 0;
     /// Of images the worker counts.
     ImageCounts counts_{0, 0, 0, 0};

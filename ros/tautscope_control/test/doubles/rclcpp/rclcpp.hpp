@@ -45,7 +45,11 @@ class Time {
 public:
     explicit Time(std::int64_t nanoseconds = 0, rcl_clock_type_t = RCL_ROS_TIME) : nanoseconds_(nanoseconds) {}
     Time(const builtin_interfaces::msg::Time &stamp, rcl_clock_type_t = RCL_ROS_TIME)
-        : nanoseconds_(stamp.sec * 1'000'000'000LL + stamp.nanosec) {}
+        : nanoseconds_(stamp.sec * 1'000'000'000LL + stamp.nanosec) {
+        if (stamp.sec < 0) {
+            throw std::runtime_error("cannot store a negative time point in rclcpp::Time");
+        }
+    }
     operator builtin_interfaces::msg::Time() const {
         return {static_cast<std::int32_t>(nanoseconds_ / 1'000'000'000), static_cast<std::uint32_t>(nanoseconds_ % 1'000'000'000)};
     }

@@ -1,0 +1,113 @@
+"""The node with a rig of one's own: a stop during its reset, which may move motors."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tautscope
+from numpy.typing import ArrayLike
+from ros2.peers import peers
+from service_client import Client
+from tautscope.errors import StateError
+from tautscope.loop.measurement import Tip
+from tautscope.loop.rig import Sample
+from tautscope.ros2 import types
+from tautscope.ros2.wire import Qos
+
+
+class Arm:
+    """Its reset moves for 0.3 s, or longer until it is interrupted."""
+
+    control_period = 0.005
+
+    def __init__(self) -> None:
+        self.is_closed = self.is_interrupted = False
+        self.duration, self.time = 0.3, 0.0
+
+    def reset(self) -> Sample:
+        end = time.monotonic() + self.duration
+        while time.monotonic() < end and not self.is_interrupted:
+            time.sleep(0.001)
+        if self.is_interrupted:
+            raise StateError("rig", "interrupted", "Call reset() to start again")
+        return self.step(np.zeros(2))
+
+    def step(self, command: ArrayLike) -> Sample:
+        self.time += self.control_period
+        position = np.array(command)
+        return Sample(self.time, position, measurement=Tip(position, self.time))
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+class Interrupted(Arm):
+    def __init__(self) -> None:
+        super().__init__()
+        self.duration = 20.0
+
+    def interrupt(self) -> None:
+        self.is_interrupted = True
+
+
+@pytest.mark.parametrize("command", ["pause", "disable"])
+@pytest.mark.parametrize("kind", [Interrupted, Arm])
+def test_a_stop_while_a_rig_resets_is_not_forgotten(
+    tmp_path: Path, kind: type[Arm], command: str
+) -> None:
+    arm, config = kind(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        for text in ("enable", command):
+            header = types.header(0, "")
+            both.requests.publish(
+                types.make("crtk_msgs/msg/StringStamped", header=header, string=text)
+            )
+        both.delivered()
+        both.control.serve()
+        assert both.control.run is None
+        assert both.control.operating_state == "FAULT"
+        assert arm.is_closed
+        assert arm.is_interrupted == (kind is Interrupted)
+
+
+def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm, config = Arm(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        both.enable(np.zeros(2))
+        error = StateError("bend_y", "fault 12", "See the manual")
+        error.add_note("bend_x: quick stop is not confirmed")
+
+        def broken(command: ArrayLike) -> Sample:
+            raise error
+
+        monkeypatch.setattr(arm, "step", broken)
+        both.tick()
+        assert both.control.fault.endswith("; bend_x: quick stop is not confirmed")
+        assert both.control.fault in [each.data for each in both.drain(both.warnings)]
+
+
+def test_the_share_of_the_compensation_in_use_is_published(tmp_path: Path) -> None:
+    arm, config = Arm(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both, Client(both) as client:
+        shares = both.other.subscription(
+            "/instrument/hysteresis/compensation", "std_msgs/msg/Float64", Qos(depth=100)
+        )
+        both.delivered(resend=True)
+        both.enable(np.zeros(2))
+        for share in (1.0, 0.0):
+            client.set_parameters(("compensation", share))
+            both.drain(shares)
+            for _ in range(5):
+                both.tick()
+            assert {each.data for each in both.drain(shares)} == {share}
