@@ -185,6 +185,25 @@ def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
         control.shut_down()
 
 
+class Disabled(Arm):
+    is_disabled = False
+
+    def disable(self) -> None:
+        self.is_disabled = True
+
+
+def test_disabling_reaches_a_rig_that_can(tmp_path: Path) -> None:
+    arm = Disabled(2)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(tautscope.axes(2, width_limit=1.0), rig, tmp_path, executor)
+        control.operator.is_present = lambda now: True  # type: ignore[method-assign]
+        control.open()
+        control.close("monitor", is_disabling=True)
+        assert arm.is_disabled
+        control.shut_down()
+
+
 class Unconfirmed(Arm):
     """Its drives do not confirm a stop: `close` says so, or a note of the error of `step`."""
 

@@ -75,6 +75,25 @@ def test_a_stop_while_a_rig_resets_is_not_forgotten(
         assert arm.is_interrupted == (kind is Interrupted)
 
 
+class Disabled(Arm):
+    is_disabled = False
+
+    def disable(self) -> None:
+        self.is_disabled = True
+
+
+@pytest.mark.parametrize("kind", [Disabled, Arm])
+def test_disable_reaches_a_rig_that_has_it(tmp_path: Path, kind: type[Arm]) -> None:
+    arm, config = kind(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        both.enable(np.zeros(2))
+        both.request("disable")
+        assert both.control.run is None
+        assert getattr(arm, "is_disabled", arm.is_closed)
+
+
 def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

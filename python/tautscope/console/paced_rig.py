@@ -10,7 +10,7 @@ from typing import TypeVar
 from numpy.typing import ArrayLike
 
 from tautscope.errors import DriveError, TautscopeError
-from tautscope.loop.rig import Rig, Sample
+from tautscope.loop.rig import Rig, Sample, disable
 
 T = TypeVar("T")
 
@@ -80,6 +80,12 @@ class PacedRig:
         rig, self._rig = self._rig, None
         if rig is not None:
             self._checked(rig.close)
+
+    def disable(self) -> None:
+        """Like `close`, and disable the motors of a rig that can, as a `MotorRig`."""
+        rig, self._rig = self._rig, None
+        if rig is not None:
+            self._checked(lambda: disable(rig))
 
     @staticmethod
     def _checked(call: Callable[[], T]) -> T:

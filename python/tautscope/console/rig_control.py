@@ -23,7 +23,7 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
-from tautscope.loop.rig import Rig, Sample, check_sample, reset_unless
+from tautscope.loop.rig import Rig, Sample, check_sample, disable, reset_unless
 
 _LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
@@ -100,14 +100,14 @@ class RigControl:
         self.operator.reset(np.array(sample.applied, np.float64))
         self._start_run(sample)
 
-    def close(self, fault: str = "", *, disable: bool = False) -> None:
-        """End the run; motors are quick-stopped, with `disable` also without power."""
+    def close(self, fault: str = "", *, is_disabling: bool = False) -> None:
+        """End the run; motors are quick-stopped, with `is_disabling` also without power."""
         run, self.run = self.run, None
         self.operator.interrupt()
         self.fault = fault
         if run is None:
             return
-        self._stop_motors(fault, disable=disable)
+        self._stop_motors(fault, is_disabling=is_disabling)
         if self.fault:
             run.note(f"rig off: {self.fault}")
         self._end(run)
@@ -159,11 +159,11 @@ class RigControl:
         for thread in self._endings:
             thread.join()
 
-    def _stop_motors(self, fault: str, *, disable: bool = False) -> None:
+    def _stop_motors(self, fault: str, *, is_disabling: bool = False) -> None:
         self.fault = fault
         try:
-            if isinstance(self._rig, HardwareRig) and disable:
-                self._rig.disable()
+            if self.is_hardware and is_disabling:
+                disable(self._rig)
             elif self.is_hardware:
                 self._rig.close()
         except TautscopeError as error:

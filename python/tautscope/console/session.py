@@ -80,7 +80,7 @@ class Session:
             supervision = run.loop.supervision
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank and control.is_hardware:
                 reason = f"{supervision.reaction}: {', '.join(supervision.flags)}"
-                control.close(reason, disable=supervision.reaction is Reaction.DISABLE)
+                control.close(reason, is_disabling=supervision.reaction is Reaction.DISABLE)
                 return
             self._publish()
             run.step()

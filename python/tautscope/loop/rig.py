@@ -130,6 +130,12 @@ def reset_unless(rig: Rig, must_stop: Callable[[], bool]) -> Sample:
     return sample
 
 
+def disable(rig: Rig) -> None:
+    """`disable` of a rig that has it, as `MotorRig`: nothing holds its motors; else `close`."""
+    end: Callable[[], None] = getattr(rig, "disable", rig.close)
+    end()
+
+
 def check_sample(sample: Sample, config: Config) -> Sample:
     """The sample, where its parts are as `Sample` says.
 

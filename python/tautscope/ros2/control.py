@@ -20,7 +20,7 @@ from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
-from tautscope.loop.rig import Frame, Rig, reset_unless
+from tautscope.loop.rig import Frame, Rig, disable, reset_unless
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
@@ -266,8 +266,8 @@ class NodeControl:
         if not self.fault:
             self._states.goal = OperatingState.DISABLED
         try:
-            if isinstance(self._rig, HardwareRig) and self._is_disabling:
-                self._rig.disable()
+            if self._rig is not None and self._is_disabling:
+                disable(self._rig)
             elif self._rig is not None:
                 self._rig.close()
         finally:
