@@ -89,11 +89,13 @@ def units_of(dof: Dof) -> Mapping[str, float]:
 
 
 def time_scale(largest: float, unit: str) -> float:
-    """Seconds per tick; times since 1970 are in s, ms, us or ns by their size."""
+    """Seconds per tick: of the unit, or without one, as of times since 1970, by their size."""
+    if unit:
+        return TIMES[unit]
     for least, scale in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
         if largest > least:
             return scale
-    return TIMES.get(unit, 1.0)
+    return 1.0
 
 
 def parse_units(text: str) -> dict[str, str]:
