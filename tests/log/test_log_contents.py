@@ -146,6 +146,17 @@ def test_every_pixel_format_comes_back_to_the_byte(name: str) -> None:
         codec.decode(data[:20])
 
 
+@pytest.mark.parametrize("name", ["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"])
+def test_every_pixel_format_comes_back_from_jpeg(name: str) -> None:
+    camera = CameraConfig(width=64, height=48, pixel_format=name)
+    codec = ImageCodec(camera, RecordingConfig(image_format="jpeg"))
+    image = np.full(FrameLayout(camera).shape, 100, np.uint8)
+    found = codec.decode(codec.encode(image))
+    assert found.shape == image.shape
+    used = slice(None, 3) if name == "bgra" else slice(None)
+    np.testing.assert_allclose(found[..., used], image[..., used], atol=3)
+
+
 def test_importing_the_package_loads_no_log_and_no_camera() -> None:
     code = (
         "import sys, tautscope, tautscope.runs.experiment, tautscope.cli;"
