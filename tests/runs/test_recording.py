@@ -14,7 +14,7 @@ from tautscope.errors import (
     RecordError,
 )
 from tautscope.loop.references import SineSequence
-from tautscope.runs.output_folder import default_folder, new_folder, recording_saved
+from tautscope.runs.output_folder import default_folder, new_file, new_folder, recording_saved
 from tautscope.runs.recording import Recording, Table
 from tautscope.runs.trials import Trial, run_trials
 
@@ -85,6 +85,15 @@ def test_a_recording_is_saved_behind_a_link_and_in_a_folder_that_stays(
         assert_same(Recording.load(path).trace, compensated.trace)
     assert folder.stat().st_ino == number
     assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_an_input_that_cannot_be_read_is_no_output(tmp_path: Path) -> None:
+    name = str(tmp_path / (300 * "x"))
+    with pytest.raises(OSError, match="File name too long"), new_folder(tmp_path / "run"):
+        Path(name).read_text()
+    with pytest.raises(OSError, match="File name too long"), new_file(tmp_path / "run"):
+        Path(name).read_text()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("is_new", [True, False])

@@ -78,9 +78,16 @@ def new_file(path: str | PathLike[str]) -> Iterator[Path]:
         yield partial
         partial.rename(target)
     except OSError as error:
-        raise OutputError("out", str(target), f"a place that can be written ({error})") from None
+        raise _as_output(error, target, partial) from None
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _as_output(error: OSError, target: Path, partial: Path) -> OSError | OutputError:
+    """The error of an output, unless it names another file, such as an input."""
+    if not str(error.filename or partial).startswith(str(partial)):
+        return error
+    return OutputError("out", str(target), f"a place that can be written ({error})")
 
 
 def default_folder(verb: str) -> Path:
@@ -105,12 +112,14 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
     partial = (target.parent if is_new else target) / f".{target.name}.{os.getpid()}.partial"
     try:
         partial.mkdir(parents=True)
+    except OSError as error:
+        raise OutputError("out", str(target), f"a place that can be written ({error})") from None
+    try:
         yield partial
     except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
         if isinstance(error, OSError):
-            allowed = f"a place that can be written ({error})"
-            raise OutputError("out", str(target), allowed) from None
+            raise _as_output(error, target, partial) from None
         raise
     try:
         if is_new:
