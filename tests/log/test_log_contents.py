@@ -122,8 +122,9 @@ def test_csv_is_that_of_the_run(recorded: Recorded, tmp_path: Path) -> None:
 
 def test_a_rosbag2_folder_opens_as_one(recorded: Recorded, tmp_path: Path) -> None:
     path, _, summary = recorded
-    export_rosbag(path, tmp_path / "bag")
-    with Reader(tmp_path / "bag") as bag:
+    folder = tmp_path / 'my "bag": #1'
+    export_rosbag(path, folder)
+    with Reader(folder) as bag:
         assert bag.message_count == sum(summary.messages.values())
         assert bag.duration > 5e9
         counts = {name: topic.msgcount for name, topic in bag.topics.items() if topic.msgcount}
