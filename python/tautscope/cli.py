@@ -27,7 +27,7 @@ from tautscope.commands import (
     report,
     ros2,
 )
-from tautscope.errors import TautscopeError
+from tautscope.errors import USAGE, TautscopeError
 from tautscope.extras import require_extras
 
 INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
@@ -74,9 +74,15 @@ def _main(arguments: Sequence[str] | None) -> int:
     except TautscopeError as error:
         print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         return error.exit_status
-    except KeyboardInterrupt:
-        print("interrupted; nothing was written", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print("\n".join(["interrupted", *getattr(stop, "__notes__", ())]), file=sys.stderr)
         return INTERRUPTED
+    except OSError as error:
+        if error.filename is None:
+            raise
+        text = f"error: {error.filename}: {error.strerror}"
+        print("\n".join([text, *getattr(error, "__notes__", ())]), file=sys.stderr)
+        return USAGE
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 from typing import Any
 
 USAGE, REFUSED, STOPPED = 2, 3, 4
@@ -64,7 +64,7 @@ class MissingPathError(FieldError):
     """A file or folder does not exist, or has no usable content."""
 
     def __str__(self) -> str:
-        if Path(str(self.value)).exists():
+        if os.access(str(self.value), os.F_OK):  # False, too, where nobody may look
             return super().__str__()
         kind = "Folder" if self.allowed.startswith("a folder") else "File"
         return f"{kind} not found: {self.value}. Expected {self.allowed}"

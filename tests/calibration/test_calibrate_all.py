@@ -65,17 +65,26 @@ def steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Steps:
     return Steps(monkeypatch)
 
 
-def test_an_interrupted_sequence_is_resumed(steps: Steps, capsys: Capture) -> None:
+def test_an_interrupted_sequence_is_resumed(
+    steps: Steps, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also from another folder."""
     steps.failing = {"colour"}
     assert main([*COMMAND, "--yes", "--out", "out"]) == 2
     assert "colour failed" in capsys.readouterr().err
     assert load_config("rig.toml").camera.fx == 401
     assert load_config("rig.toml").calibration.colour is None
     steps.failing = set()
-    assert main([*COMMAND, "--yes", "--json"]) == 0
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    assert main([*COMMAND[:-1], "../rig.toml", "--yes", "--json"]) == 0
+    monkeypatch.chdir(tmp_path)
     printed = capsys.readouterr()
     assert "Resumed; done: camera" in printed.err
-    assert json.loads(printed.out) == {"folder": "out", "done": ["camera", "colour", "motion"]}
+    assert json.loads(printed.out) == {
+        "folder": str(tmp_path / "out"),
+        "done": ["camera", "colour", "motion"],
+    }
     # Each step gets the configuration that the steps before have written.
     assert steps.seen == [("camera", 424), ("colour", 401), ("colour", 401), ("motion", 403)]
     config = load_config("rig.toml")
@@ -124,6 +133,13 @@ def test_the_terminal_answers_while_the_camera_has_the_input(
     monkeypatch.setattr(question, "TERMINAL", terminal)
     assert main([*COMMAND, "--out", "b"]) == 0
     assert len(steps.seen) == 3
+
+
+@pytest.mark.usefixtures("steps")
+def test_a_sequence_of_which_every_step_is_skipped_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("s\ns\ns\n"))
+    assert main([*COMMAND, "--out", "out"]) == 0
+    assert Path("out/report.html").read_text().count("Skipped.") == 3
 
 
 def test_a_step_that_fails_on_the_twin_ends_the_sequence(steps: Steps, capsys: Capture) -> None:

@@ -1,10 +1,14 @@
 """Values of a calibration as they are written."""
 
+from argparse import Namespace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 from tautscope.calibration.result import CalibrationResult, rounded
+from tautscope.commands.calibration_output import finish
 from tautscope.config import load_config
+from tautscope.errors import ConfigError
 
 
 @pytest.mark.parametrize(
@@ -23,6 +27,18 @@ def test_values_have_two_digits_of_their_deviation(
     value: float, std: float, written: float
 ) -> None:
     assert rounded(value, std) == pytest.approx(written, rel=1e-12)
+
+
+def test_a_result_is_printed_before_it_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("")
+    options = Namespace(write=True, config=rig, out=tmp_path / "out", json=False)
+    with pytest.raises(ConfigError, match=r"camera\.fx"):
+        finish(options, CalibrationResult("camera", {"camera.fx": -1.0}, {}))
+    assert "fx = -1.0" in capsys.readouterr().out
+    assert rig.read_text() == ""
 
 
 def test_changes_are_values_and_their_record() -> None:

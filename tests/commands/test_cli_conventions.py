@@ -128,6 +128,27 @@ def test_an_output_folder_is_checked_first(
     assert "out: got '/proc/nowhere/out', expected a place that can be written" in err
 
 
+@pytest.mark.parametrize("verb", ["analyze", "replay", "report", "recover"])
+def test_a_file_that_cannot_be_read_is_named(capsys: Capture, tmp_path: Path, verb: str) -> None:
+    name = str(tmp_path / (300 * "x"))
+    err = failed(capsys, verb, name)
+    assert err.startswith(f"error: {name}")
+    assert err.endswith(": File name too long\n")
+
+
+def test_an_interruption_says_what_was_written(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        error = KeyboardInterrupt()
+        error.add_note("The log of the run is run.mcap")
+        raise error
+
+    monkeypatch.setattr("tautscope.commands.config.load_config", stop)
+    assert main(["config"]) == 130
+    assert capsys.readouterr().err == "interrupted\nThe log of the run is run.mcap\n"
+
+
 def test_a_rig_with_placeholders_is_refused_by_name(capsys: Capture, tmp_path: Path) -> None:
     err = failed(capsys, "run", "--config", "article_rig", "--out", str(tmp_path / "run"))
     assert "drives.insertion.counts_per_unit, drives.insertion.sign" in err

@@ -2,14 +2,16 @@
 
 import io
 import json
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tautscope import figure_style
 from tautscope.cli import main
+from tautscope.commands.rig_choice import choose_rig
 from tautscope.config import load_config
-from tautscope.errors import CalibrationError
+from tautscope.errors import CalibrationError, ConfigError
 from tautscope.hardware import jog
 from tautscope.hardware.doctor import rig as rig_checks
 from tautscope.loop.kinematics import TwoPlanes
@@ -141,6 +143,34 @@ def test_a_wrong_rig_is_refused(
 ) -> None:
     assert run(*options) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "--yes"],
+        ["jog", "bend_x", "0.1", "--yes"],
+        ["calibrate", "robot", "--yes"],
+        ["calibrate", "latency", "--yes"],
+    ],
+    ids=" ".join,
+)
+def test_placeholders_of_a_rig_of_your_own_are_refused(
+    folder: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = ROBOT.replace("range = [-1.5, 1.5]", "range = [-1.5, 1.5] # REPLACE", 1)
+    (folder / "robot.toml").write_text(text, encoding="utf-8")
+    rig = ["--config", "robot.toml", "--rig", "catheter_of_a_newcomer:Catheter"]
+    assert main([*words, *rig]) == 2
+    assert "dof[0].range: got 'placeholders of" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_console_refuses_placeholders(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(ROBOT.replace("]]", "]] # REPLACE", 1), encoding="utf-8")
+    options = Namespace(rig="catheter_of_a_newcomer:Catheter", config="robot.toml")
+    with pytest.raises(ConfigError, match=r"dof\[0\]: got 'placeholders of"):
+        choose_rig(options, in_real_time=True)
 
 
 def test_a_motion_needs_a_range(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -52,6 +52,42 @@ def test_sections_are_added_to_an_empty_file() -> None:
     assert "[camera]\n" not in text
 
 
+STYLES = {
+    "dotted": "camera.fx = 424.0\ncamera.fy = 454.0\n[experiment]\nperiods = 3\n",
+    "dotted in a table": '[camera]\nsource.url = "x"\nfy = 454.0\n[experiment]\nperiods = 3\n',
+    "inline": "camera = { fx = 424.0, fy = 454.0 }\n[experiment]\nperiods = 3\n",
+    "inline in inline": "camera = { fy = 454.0, source = { deinterlace = true } }\n",
+    "inline in a table": '[camera]\nfy = 454.0\nsource = { url = "x" }\n',
+    "calibrated, dotted": "camera.fy = 454.0\ncalibration.camera = { residual = 0.1 }\n",
+    "out of order": "[camera]\nfy = 4.0\n[experiment]\nperiods = 3\n[camera.source]\nurl = 'x'\n",
+}
+
+
+@pytest.mark.parametrize("text", STYLES.values(), ids=list(STYLES))
+def test_values_are_written_in_every_style(text: str) -> None:
+    values = {
+        "camera.source.delay": 0.1,
+        "camera.fx": 425.0,
+        "camera.camera_from_guide.translation": (0.1, 0.0, 0.2),
+        "calibration.geometry": RECORD,
+    }
+    expected = tomllib.loads(text)
+    expected["camera"]["fx"] = 425.0
+    expected["camera"].setdefault("source", {})["delay"] = 0.1
+    expected["camera"]["camera_from_guide"] = {"translation": [0.1, 0.0, 0.2]}
+    expected.setdefault("calibration", {})["geometry"] = RECORD
+    assert tomllib.loads(edited_text(text, values)) == expected
+
+
+def test_a_link_to_a_configuration_stays_one(tmp_path: Path) -> None:
+    file, link = tmp_path / "shared.toml", tmp_path / "rig.toml"
+    file.write_text(ARTICLE)
+    link.symlink_to("shared.toml")
+    write_values(link, {"camera.fx": 430.5})
+    assert link.is_symlink()
+    assert load_config(file).camera.fx == 430.5
+
+
 def test_an_invalid_result_is_not_written(tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
     file.write_text(ARTICLE)

@@ -25,6 +25,58 @@ def test_the_template_reads_back_equal(name: str | None, tmp_path: Path) -> None
     assert set(placeholders(file)) == set(placeholders(name))
 
 
+MARKED = """\
+profile = "best" # REPLACE
+recording = { flush_period = 0.1 } # REPLACE
+control.period = 0.01 # REPLACE: of the drives
+[drives] # REPLACE
+interface = "socketcan"
+[drives.motors.turn] # REPLACE
+node = 1
+counts_per_unit = 1e4
+speed_limit = 1.0
+travel = [ # REPLACE
+  -1.0,
+  1.0,
+]
+[camera] # REPLACE
+fx = 424.0
+[drives.motors.reach]
+node = 2 # REPLACE
+counts_per_unit = 1e4
+speed_limit = 1.0
+travel = [
+  -1.0,
+  1.0, # REPLACE
+]
+[actuators]
+matrix = [[1.0, 0.0], [0.0, 1.0]] # REPLACE
+names = ["turn", "reach"]
+units = ["rad", "rad"]
+# REPLACE is no placeholder in a line of its own.
+[[dof]]
+name = "a"
+width_limit = 0.2 # REPLACE
+[[dof]] # REPLACE
+name = "b"
+width_limit = 0.2
+"""
+PLACES = """profile; recording; control.period; drives; drives.motors.turn;
+drives.motors.turn.travel; camera; drives.motors.reach.node; drives.motors.reach.travel;
+actuators.matrix; dof[0].width_limit; dof[1]"""
+
+
+def test_placeholders_are_found_everywhere_and_kept_in_the_template(tmp_path: Path) -> None:
+    mine, copy = tmp_path / "mine.toml", tmp_path / "copy.toml"
+    mine.write_text(MARKED, encoding="utf-8")
+    assert placeholders(mine) == tuple(re.split(r";\s", PLACES))
+    config = load_config(mine)
+    copy.write_text(template(config, placeholders(mine)), encoding="utf-8")
+    assert load_config(copy) == config
+    assert list(load_config(copy).drives.motors) == ["turn", "reach"]  # type: ignore[union-attr]
+    assert set(placeholders(copy)) == set(placeholders(mine))
+
+
 def test_every_key_of_the_template_has_its_meaning_and_range() -> None:
     text = template(Config())
     flat = re.sub(r"\n(# )+", " ", text)

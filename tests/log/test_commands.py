@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 from tautscope.cli import main
 from tautscope.config import Config, dump_config
 from tautscope.log.reader import Log, Update, read_log
-from tautscope.log.writer import LogSummary
+from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.runs.recording import Recording, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
@@ -242,6 +242,44 @@ def test_a_dof_without_motion_is_unknown(
     assert found["insertion"]["replayed"]["width"] is not None
     assert main(["replay", str(path), "--profile", "best", "--out", str(tmp_path / "b")]) == 0
     assert "unknown" in capsys.readouterr().out
+
+
+def test_csv_goes_to_the_folder_that_is_given(
+    recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(recorded[0]), "--csv", "."]) == 0
+    assert (tmp_path / "trace.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("recover .", "log: got '.'"),
+        ("export . --csv", "log: got '.'"),
+        ("replay {log} --units time=ms", "--units: got 'time=ms'"),
+        ("replay {log} --video-start 1", "--video-start: got 1.0"),
+        ("align {log} --config article_rig", "--config: got 'article_rig'"),
+        ("align --video {log} --motors one.csv", "motor positions: got '1 line'"),
+        ("replay none.mcap", "log: got 'none.mcap'"),
+        ("replay none.mcap --profile paper", "log: got 'no tick'"),
+    ],
+)
+def test_input_without_use_or_content_is_refused(
+    words: str,
+    message: str,
+    recorded: Recorded,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log = recorded[0]
+    monkeypatch.chdir(log.parent)
+    (log.parent / "one.csv").write_text("time,insertion,rotation,bending\n0,0.02,0,0\n")
+    (log.parent / "none.mcap").unlink(missing_ok=True)
+    LogWriter("none.mcap", Config()).close()
+    before = set(log.parent.iterdir())
+    assert message in failed(capsys, *words.format(log=log).split())
+    assert set(log.parent.iterdir()) == before
 
 
 def test_replay_rejects_unusable_input(capsys: Capture, recorded: Recorded, tmp_path: Path) -> None:

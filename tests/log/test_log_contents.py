@@ -122,8 +122,9 @@ def test_csv_is_that_of_the_run(recorded: Recorded, tmp_path: Path) -> None:
 
 def test_a_rosbag2_folder_opens_as_one(recorded: Recorded, tmp_path: Path) -> None:
     path, _, summary = recorded
-    export_rosbag(path, tmp_path / "bag")
-    with Reader(tmp_path / "bag") as bag:
+    folder = tmp_path / 'my "bag": #1'
+    export_rosbag(path, folder)
+    with Reader(folder) as bag:
         assert bag.message_count == sum(summary.messages.values())
         assert bag.duration > 5e9
         counts = {name: topic.msgcount for name, topic in bag.topics.items() if topic.msgcount}
@@ -144,6 +145,17 @@ def test_every_pixel_format_comes_back_to_the_byte(name: str) -> None:
         np.testing.assert_array_equal(seen[..., ::-1], image)
     with pytest.raises(RecordError, match="no image"):
         codec.decode(data[:20])
+
+
+@pytest.mark.parametrize("name", ["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"])
+def test_every_pixel_format_comes_back_from_jpeg(name: str) -> None:
+    camera = CameraConfig(width=64, height=48, pixel_format=name)
+    codec = ImageCodec(camera, RecordingConfig(image_format="jpeg"))
+    image = np.full(FrameLayout(camera).shape, 100, np.uint8)
+    found = codec.decode(codec.encode(image))
+    assert found.shape == image.shape
+    used = slice(None, 3) if name == "bgra" else slice(None)
+    np.testing.assert_allclose(found[..., used], image[..., used], atol=3)
 
 
 def test_importing_the_package_loads_no_log_and_no_camera() -> None:

@@ -8,6 +8,7 @@ import pytest
 from drawn import BACKLASH
 from recorded import record
 from tautscope.config import Config
+from tautscope.errors import RecordError
 from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.replay import estimate_from_log, estimate_from_video, replay_same
 from tautscope.log.writer import LogSummary
@@ -95,6 +96,9 @@ def test_a_gap_ends_the_comparison(recorded: Recorded) -> None:
     assert found.is_identical
     assert found.ticks + found.updates == 99
     assert found.ended == f"tick, update or request 100 of {max(log.events)} is not in the log"
+    del log.events[1]
+    with pytest.raises(RecordError, match=r"log: got 'tick, update or request 1 of"):
+        replay_same(log)
 
 
 def test_jpeg_is_not_identical_but_close(tmp_path: Path, config: Config) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from drawn import DrawnRig
 from tautscope.config import Config
-from tautscope.errors import OutputError, RecordError
+from tautscope.errors import FieldError, OutputError, RecordError
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import HysteresisReduction
@@ -145,6 +145,13 @@ def test_images_are_lossless_while_that_is_requested(tmp_path: Path, config: Con
     read = read_log(tmp_path / "run.mcap")
     exact = [(read.image(index) == noise).all() for index in read.events]
     assert exact == [each == "png" for each in formats]
+
+
+def test_an_unknown_image_format_is_refused(tmp_path: Path, config: Config) -> None:
+    with LogWriter(tmp_path / "run.mcap", config) as log:
+        with pytest.raises(FieldError, match="image_format: got 'tiff', expected one of png, jpeg"):
+            log.image_format = "tiff"  # type: ignore[assignment]
+        assert log.image_format == "png"
 
 
 def test_logged_arrays_may_be_reused(tmp_path: Path, config: Config) -> None:

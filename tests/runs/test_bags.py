@@ -164,6 +164,21 @@ def test_topics_at_different_rates_become_a_record_of_the_tip(tmp_path: Path) ->
     assert record.units == ("", "m")
 
 
+def test_a_bag_of_the_tip_keeps_its_time(tmp_path: Path) -> None:
+    """The recording of the tip begins 0.3 s later than that of the motors."""
+    motors = [(t, joint_state(t, {"m": m})) for t, m in zip(TIMES, MOTOR, strict=True)]
+    tips = [(t, point(t, (m, 0, 0))) for t, m in zip(TIMES[30:], MOTOR[30:], strict=True)]
+    files = [
+        write_bag(tmp_path / "motors", "mcap", {"/j": motors}),
+        write_bag(tmp_path / "tips", "mcap", {"/tip": tips}),
+    ]
+    columns = "/j/m/position", "/tip/point/x", "time"
+    record = read_record(files[0], *columns, tip_path=files[1])
+    seen = np.isfinite(record.measured)
+    np.testing.assert_array_equal(record.measured[seen], MOTOR[30:])
+    np.testing.assert_allclose(record.command[seen], MOTOR[30:], atol=1e-9)
+
+
 def test_columns_of_a_bag_are_listed_and_pairs_proposed(tmp_path: Path) -> None:
     topics = {
         "/joint_states": [(t, joint_state(t, {"m": m})) for t, m in zip(TIMES, MOTOR, strict=True)],

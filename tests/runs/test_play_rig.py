@@ -1,14 +1,18 @@
 """The simulated robot of plays is any robot of a configuration."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from drawn import EXAMPLES
 from play_model import play
 from tautscope import PlayRig, Pose, Tip, axes, load_config, run_experiment
-from tautscope.config import Config
+from tautscope.config import Config, Sine
 from tautscope.errors import ConfigError
 from tautscope.loop.actuators import with_actuators
+from tautscope.loop.references import OperatorMotion
 from tautscope.report.operator_motion import motion_of
+from tautscope.runs.recording import Floats
 from tautscope.runs.rigs import rig_maker
 
 
@@ -41,6 +45,25 @@ def test_motors_pose_and_what_does_not_move_the_tip() -> None:
     assert jaw.sensor == 1
     assert np.isnan(jaw.values[:4]).all()
     assert first.time - pose.captured_at == pytest.approx(0.05, abs=0.0051)
+
+
+class LateRig(PlayRig):
+    """Measures the tip where it was 0.1 s ago, with the present time as the stamp."""
+
+    def measure(self, tip: Floats, time: float) -> Iterator[Tip]:
+        self.past = [*getattr(self, "past", []), tip.copy()]
+        if self.ticks % 5 == 0 and len(self.past) > 20:
+            yield Tip(self.past[-21], time)
+
+
+def test_updates_are_recorded_at_the_time_of_their_measurement() -> None:
+    config = axes(1, width_limit=0.2).replace(**{"measurement.delays": [0.1]})
+    motion = OperatorMotion([Sine(centre=0.0, amplitude=0.5)], 3, 4.0)
+    run = run_experiment(LateRig(config, 0.02), motion, config)
+    frames = run.frames[10:]
+    np.testing.assert_allclose(frames["arrived_at"] - frames["captured_at"], 0.1, atol=1e-9)
+    moved = np.abs(frames["estimate_axis_1"] - frames["true_axis_1"])
+    assert np.sqrt(np.mean(moved**2)) < 0.02 * np.ptp(frames["true_axis_1"])
 
 
 def test_a_configuration_alone_is_a_rig() -> None:

@@ -1,5 +1,6 @@
 """Recordings read back equal, from files and from worker processes."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,12 @@ from drawn import make_bad_frame_rig, make_drawn_rig, short_experiment
 from tautscope.errors import (
     FrameError,
     MissingPathError,
+    MotionHeldError,
     OutputError,
     RecordError,
 )
 from tautscope.loop.references import SineSequence
+from tautscope.runs.output_folder import default_folder, new_file, new_folder, recording_saved
 from tautscope.runs.recording import Recording, Table
 from tautscope.runs.trials import Trial, run_trials
 
@@ -60,9 +63,71 @@ def test_a_failed_save_leaves_no_folder(
         raise OSError("disk full")
 
     monkeypatch.setattr("tautscope.runs.recording.dump_config", full)
-    with pytest.raises(OSError, match="disk full"):
-        compensated.save(tmp_path / "run")
+    (tmp_path / "empty").mkdir()
+    for name in ("run", "empty"):
+        with pytest.raises(OutputError, match="disk full"):
+            compensated.save(tmp_path / name)
+    assert [each.name for each in tmp_path.rglob("*")] == ["empty"]
+
+
+def test_a_recording_is_saved_behind_a_link_and_in_a_folder_that_stays(
+    compensated: Recording, tmp_path: Path
+) -> None:
+    """A mount point cannot be replaced, nor can the working directory."""
+    folder, link, ahead = (tmp_path / name for name in ("folder", "link", "ahead"))
+    folder.mkdir()
+    number = folder.stat().st_ino
+    link.symlink_to(folder)
+    ahead.symlink_to(tmp_path / "new")
+    for path in (link, ahead):
+        compensated.save(path)
+        assert path.is_symlink()
+        assert_same(Recording.load(path).trace, compensated.trace)
+    assert folder.stat().st_ino == number
+    assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_an_input_that_cannot_be_read_is_no_output(tmp_path: Path) -> None:
+    name = str(tmp_path / (300 * "x"))
+    with pytest.raises(OSError, match="File name too long"), new_folder(tmp_path / "run"):
+        Path(name).read_text()
+    with pytest.raises(OSError, match="File name too long"), new_file(tmp_path / "run"):
+        Path(name).read_text()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("is_new", [True, False])
+def test_results_are_kept_if_the_folder_was_taken_meanwhile(is_new: bool, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    if not is_new:
+        folder.mkdir()
+    with (
+        pytest.raises(OutputError, match="still free at the end") as found,
+        new_folder(folder) as new,
+    ):
+        (new / "mine").write_text("results")
+        folder.mkdir(exist_ok=True)
+        (folder / "mine").write_text("theirs")
+    assert str(new) in str(found.value)
+    assert (new / "mine").read_text() == "results"
+    assert (folder / "mine").read_text() == "theirs"
+
+
+def test_commands_of_one_second_have_folders_of_their_own() -> None:
+    first = default_folder("analyze")
+    time.sleep(0.002)
+    assert default_folder("analyze") != first
+
+
+def test_held_motion_is_reported_if_its_recording_cannot_be_written(
+    compensated: Recording, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    error = MotionHeldError(1.0, "hold_motion", ("late_tick",))
+    error.recording = compensated
+    with pytest.raises(MotionHeldError) as found, recording_saved(tmp_path / "file" / "run"):
+        raise error
+    assert "not written" in found.value.__notes__[0]
 
 
 def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,6 +45,8 @@ DIALECTS = {
     "preamble": b"Rig;7\nOperator;A, B\n\nt;motor;tip\n0;1,5;2\n1;2,5;3\n2;;\n3;;\n",
     "sep=": b"sep=;\nt;motor;tip\n0;1,5;2\n1;2,5;3\n",
     "gzip": gzip.compress(b"t,motor,tip\n0,1.5,2\n1,2.5,3\n"),
+    "seconds since the start, in ns": b"t_ns,motor,tip\n5000000000000,1.5,2\n5001000000000,2.5,3\n",
+    "seconds since the start, in us": b"t [us],motor,tip\n500000000000,1.5,2\n500001000000,2.5,3\n",
     "epoch in ns": b"t,motor,tip\n1763000000000000000,1.5,2\n1763000001000000000,2.5,3\n",
     "epoch in us": b"t,motor,tip\n1763000000000000,1.5,2\n1763000001000000,2.5,3\n",
     "epoch in ms": b"t,motor,tip\n1763000000000,1.5,2\n1763000001000,2.5,3\n",
@@ -93,6 +96,35 @@ def test_parquet_and_standard_input(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     text = SimpleNamespace(buffer=io.BytesIO(DIALECTS["decimal comma"]))
     monkeypatch.setattr("sys.stdin", text)
     np.testing.assert_array_equal(read_record("-", "motor", "tip").command, [1.5, 2.5])
+
+
+@pytest.mark.parametrize("kind", ["dates", "times of day", "dates and numbers", "durations"])
+def test_a_tip_of_another_file_keeps_its_time(kind: str, tmp_path: Path) -> None:
+    """The tip's file begins 3 s later."""
+    start = datetime(2026, 11, 22, 10, 0, 0, 250_000, UTC)
+    stamps = [start + timedelta(seconds=k) for k in range(9)]
+    motors: list[object] = [stamp.isoformat() for stamp in stamps]
+    if kind == "times of day":
+        motors = [f"{stamp:%H:%M:%S.%f}" for stamp in stamps]
+    elif kind == "durations":
+        motors = [stamp - datetime(2026, 1, 1, tzinfo=UTC) for stamp in stamps]
+    numbers = [stamp.timestamp() for stamp in stamps]
+    tips = numbers if kind == "dates and numbers" else motors
+    values = [float(k * k) for k in range(9)]
+    motor, tip = tmp_path / "motor.parquet", tmp_path / "tip.parquet"
+    pl.DataFrame({"time": motors, "motor": values}).write_parquet(motor)
+    pl.DataFrame({"time": tips[3:8], "tip": values[3:8]}).write_parquet(tip)
+    found = read_record(motor, "motor", "tip", "time", tip_path=tip)
+    seen = np.isfinite(found.measured)
+    np.testing.assert_array_equal(found.measured[seen], values[3:8])
+    np.testing.assert_allclose(found.command[seen], found.measured[seen], atol=1e-5)
+
+
+def test_a_column_without_a_time_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("time,motor,tip\n,1,2\n,2,3\n")
+    with pytest.raises(RecordError, match=r"log.csv, column time: got 'no time'"):
+        read_record(file, "motor", "tip", "time")
 
 
 def test_motors_have_units(tmp_path: Path) -> None:
@@ -259,8 +291,8 @@ def test_numbers_too_small_to_divide_by_are_zero(ending: str, tmp_path: Path) ->
     frame = pl.DataFrame({"time": [1e-308, 2e-308], "motor": [1e-90, -2.0]})
     getattr(frame, f"write_{ending}")(file)
     sheet = open_table(file)
-    np.testing.assert_array_equal(sheet.values(0, "time"), [0.0, 0.0])
-    np.testing.assert_array_equal(sheet.values(1, "motor"), [1e-90, -2.0])
+    np.testing.assert_array_equal(sheet.values(0, "time")[0], [0.0, 0.0])
+    np.testing.assert_array_equal(sheet.values(1, "motor")[0], [1e-90, -2.0])
 
 
 def test_a_panic_of_the_parquet_reader_is_named(

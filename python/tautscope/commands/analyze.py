@@ -64,8 +64,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
     analyze.add_argument(
         "--time",
         metavar="COL",
-        help="column of the time: in s or the unit of its title, since 1970 by its size, or dates "
-        "and times of day [a column titled time, t, stamp or timestamp]",
+        help="column of the time: in the unit of its title, without one in s, or since 1970 by its "
+        "size; or dates and times of day [a column titled time, t, stamp or timestamp]",
     )
     analyze.add_argument(
         "--tip-file",

@@ -58,11 +58,10 @@ def _run(options: argparse.Namespace) -> None:
     confirm(f"{dof.label} will move to both of its stops.", options, config.camera)
     stops = find_stops(config, dof, options.torque)
     changes = stops.changes(config.drives, dof)
-    if options.write:
-        write_values(options.config, changes)
     ends = [stops.lower, stops.upper]
     print_json(options, {"dof": dof.label, "stops": ends, "changes": changes})
     for path, value in changes.items():
         print(f"{path} = {value}")
-    if options.write:
+    if options.write:  # what is printed already is not lost by an error
+        write_values(options.config, changes)
         print(f"# written: {options.config}")

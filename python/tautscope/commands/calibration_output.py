@@ -47,17 +47,9 @@ def check_options(options: argparse.Namespace) -> None:
 
 
 def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
-    """Write and print a result as the options say."""
+    """Print and write a result as the options say; printed first, no error loses it."""
     changes = result.changes()
     text = edited_text("", changes)
-    if options.write:
-        write_values(options.config, changes)
-    if options.out is not None:
-        with new_folder(options.out) as partial:
-            (partial / "values.toml").write_text(text, encoding="utf-8")
-            for k, (figure, _) in enumerate(result.figures, 1):
-                number = f"_{k}" if len(result.figures) > 1 else ""
-                figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
     values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
     record = changes[f"calibration.{result.kind}"]
     notes = list(result.notes)
@@ -66,4 +58,11 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
     for note in result.notes:
         print(f"# {note}")
     if options.write:
+        write_values(options.config, changes)
         print(f"# written: {options.config}")
+    if options.out is not None:
+        with new_folder(options.out) as partial:
+            (partial / "values.toml").write_text(text, encoding="utf-8")
+            for k, (figure, _) in enumerate(result.figures, 1):
+                number = f"_{k}" if len(result.figures) > 1 else ""
+                figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)

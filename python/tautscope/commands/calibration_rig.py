@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -137,13 +138,13 @@ def run_protocol(
             return recording, None
 
 
-def refuse_wrong_limits(config: str) -> None:
-    """Refuse a configuration in which values of the drives are placeholders.
+def refuse_wrong_limits(config: str | None) -> None:
+    """Refuse a configuration in which values of the drives or of [[dof]] are placeholders.
 
     Raises:
         ConfigError: Names the keys.
     """
-    marked = [key for key in placeholders(config) if key.startswith("drives.")]
+    marked = [key for key in placeholders(config) if re.match(r"(drives|dof)\b", key)]
     if marked:
         allowed = f"your values, and lines without the word {MARK}: the motors would move wrongly"
         raise ConfigError(", ".join(marked), f"placeholders of {config}", allowed)

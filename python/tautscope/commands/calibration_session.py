@@ -56,7 +56,7 @@ class CalibrationSession:
         self._state_file = writable_file(file).with_suffix(".calibration.json")
         state = None if restart else _read(self._state_file)
         if state is None or state.is_finished:
-            state = SessionState(str(folder), seed)
+            state = SessionState(str(folder.absolute()), seed)
         if state.seed != seed:
             names = [
                 "the rig" if one is None else f"--twin --seed {one}" for one in (state.seed, seed)
@@ -89,6 +89,7 @@ class CalibrationSession:
 
     def finish(self, titles: Mapping[str, str]) -> Path:
         """Write the report, and note that all is done; the path of the report."""
+        self.folder.mkdir(parents=True, exist_ok=True)
         report = self.folder / "report.html"
         report.write_text(self._page(titles), encoding="utf-8")
         self.state.is_finished = True

@@ -70,6 +70,7 @@ def _run(options: argparse.Namespace) -> int:
             what = "neither --reference nor --periods nor --compare"
             raise FieldError("--rig", options.rig, what)
         config, make = choose_rig(options)
+        refuse_placeholders(options.config)
         robot.run(options, config, options.rig, make, seed=0)
         return 0
     if options.seconds is not None:

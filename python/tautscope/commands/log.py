@@ -17,7 +17,7 @@ from tautscope.commands.positions import (
 )
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import Config, load_config
-from tautscope.errors import FieldError
+from tautscope.errors import FieldError, MissingPathError
 from tautscope.extras import require_extras
 from tautscope.hardware.video import read_video
 from tautscope.log.comparison import write_replay
@@ -64,7 +64,7 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         "--csv",
         type=Path,
         nargs="?",
-        const=Path(),
+        const=False,
         metavar="DIR",
         help="folder, new or empty [FILE-csv beside it]",
     )
@@ -98,7 +98,7 @@ def _recover(options: argparse.Namespace) -> None:
     from tautscope.log.export import recover  # noqa: PLC0415
 
     file: Path = options.file
-    recovery = recover(file, options.out or file.with_name(f"{file.stem}-recovered.mcap"))
+    recovery = recover(file, options.out or _beside(file, "-recovered.mcap"))
     duration = (recovery.last - recovery.first) / 1e9
     document = {
         "file": str(recovery.path),
@@ -133,11 +133,17 @@ def _export(options: argparse.Namespace) -> None:
         document = {"file": str(options.rerun), "images": images}
         print(f"{options.rerun}: {len(log.events)} ticks, updates and requests, {images} images.")
     else:
-        folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
+        folder = options.csv or _beside(file, "-csv")
         damage = export_csv(file, folder)
         document = {"folder": str(folder)}
         print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
     _print_damage(options, document, damage)
+
+
+def _beside(file: Path, end: str) -> Path:
+    if not file.is_file():
+        raise MissingPathError("log", str(file), "an MCAP file")
+    return file.with_name(f"{file.stem}{end}")
 
 
 def _print_damage(options: argparse.Namespace, document: dict[str, Any], damage: Damage) -> None:

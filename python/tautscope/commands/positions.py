@@ -102,13 +102,17 @@ def check_video_options(options: argparse.Namespace) -> None:
     """Check that there is either a log or a video with motor positions.
 
     Raises:
-        FieldError: There is not.
+        FieldError: There is not, or an option of videos is given with a log.
     """
     if (options.file is None) == (options.video is None):
         given = None if options.file is None else "a log and --video"
         raise FieldError(options.verb, given, "a log, or --video with --motors")
     if (options.video is None) != (options.motors is None):
         raise FieldError("--motors", options.motors, "a file of motor positions and --video")
+    if options.video is None and options.units:
+        raise FieldError("--units", options.units, "--motors, which it describes, and --video")
+    if options.video is None and options.video_start is not None:
+        raise FieldError("--video-start", options.video_start, "--video, of which it is the time")
 
 
 def align_video_options(

@@ -69,6 +69,8 @@ def choose_rig(
     config = load_config(options.config or robot, profile)
     if not in_real_time:
         return config, make
+    if not is_twin:
+        refuse_placeholders(options.config)
     period = config.control.period
     return config, lambda used: PacedRig(lambda: make(used), period, is_simulated=bool(is_twin))
 

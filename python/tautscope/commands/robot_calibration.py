@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_yes, confirm_motion
+from tautscope.commands.calibration_rig import add_yes, confirm_motion, refuse_wrong_limits
 from tautscope.commands.printing import progress_bar
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
@@ -77,6 +77,7 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
     config, make = choose_rig(options)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
+    refuse_wrong_limits(options.config)
     sweep = sweep_motion(config, options.seconds or DURATION / 2)
     confirm_motion(options, "over 80 % of each range. Keep", config)
     rig = make(config)

@@ -13,7 +13,7 @@ from tempfile import NamedTemporaryFile
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Item, Table
+from tomlkit.items import InlineTable, Item, Table
 
 from tautscope.config.load import RIGS
 from tautscope.config.placeholders import MARK
@@ -36,7 +36,7 @@ def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
         ConfigError: It is a shipped configuration, or the result would not be valid.
         OutputError: It cannot be written.
     """
-    file = writable_file(path)
+    file = writable_file(path).resolve()  # a link stays one
     text = edited_text(file.read_text(encoding="utf-8"), values)
     from_document(tomllib.loads(text))
     try:
@@ -52,7 +52,7 @@ def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
         with suppress(OSError, UnboundLocalError):
             Path(partial.name).unlink()
         allowed = f"a file in a folder that can be written ({error.strerror})"
-        raise OutputError("config", str(file), allowed) from None
+        raise OutputError("config", str(path), allowed) from None
 
 
 def writable_file(path: str | PathLike[str]) -> Path:
@@ -75,12 +75,24 @@ def edited_text(text: str, values: Mapping[str, Any]) -> str:
     """The text of a TOML file with changed values, which may be a part of a configuration.
 
     Raises:
-        ConfigError: The text is not TOML.
+        ConfigError: The text is not TOML, or has no place for the values.
     """
-    try:
-        document = tomlkit.parse(text)
-    except tomlkit.exceptions.TOMLKitError as error:
-        raise ConfigError("config", text.partition("\n")[0], f"TOML ({error})") from None
+    for inline_too in (False, True):  # a header among dotted keys would take the keys below it
+        try:
+            document = _edited(text, values, inline_too)
+        except tomlkit.exceptions.TOMLKitError as error:
+            raise ConfigError("config", text.partition("\n")[0], f"TOML ({error})") from None
+        edited = tomlkit.dumps(document)
+        with suppress(tomllib.TOMLDecodeError):
+            if tomllib.loads(edited) == document.unwrap():
+                return edited
+    allowed = "tables such as [camera], into which the values can be written"
+    raise ConfigError("config", ", ".join(values), allowed)
+
+
+def _edited(text: str, values: Mapping[str, Any], is_inline: bool) -> tomlkit.TOMLDocument:
+    """A changed document, with new sections in others as inline tables if `is_inline`."""
+    document = tomlkit.parse(text)
     for path, value in values.items():
         *sections, key = path.split(".")
         place: Any = document
@@ -88,15 +100,19 @@ def edited_text(text: str, values: Mapping[str, Any]) -> str:
             if section not in place:
                 # A table without values of its own has no header.
                 is_super = isinstance(value, dict) or section != sections[-1]
-                place[section] = tomlkit.table(is_super_table=is_super)
+                if isinstance(place, InlineTable) or (is_inline and place is not document):
+                    place[section] = tomlkit.inline_table()
+                else:
+                    place[section] = tomlkit.table(is_super_table=is_super)
             place = place[section]
-        _set(place, key, without_numpy(value))
-    return tomlkit.dumps(document)
+        _set(place, key, without_numpy(value), is_inline)
+    return document
 
 
-def _set(place: Any, key: str, value: Any) -> None:
+def _set(place: Any, key: str, value: Any, is_inline: bool) -> None:
     if isinstance(value, dict):
-        table: Any = tomlkit.table() if isinstance(place, Table) else tomlkit.inline_table()
+        has_header = isinstance(place, Table) and not is_inline
+        table: Any = tomlkit.table() if has_header else tomlkit.inline_table()
         for name, item in value.items():
             table[name] = inline(item)
         place[key] = table

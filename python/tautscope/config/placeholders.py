@@ -1,6 +1,6 @@
 """Placeholders: values of a configuration that differ between rigs and are not yet replaced.
 
-A line of a TOML file has one if its comment has the word REPLACE, as in
+A key, table or entry of a TOML file is one if the comment beside it has the word REPLACE, as in
 ``tautscope/config/rigs/article_rig.toml``.
 """
 
@@ -11,7 +11,8 @@ from os import PathLike
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Item
+from tomlkit.container import Container
+from tomlkit.items import AoT, Array, InlineTable, Table
 
 from tautscope.config.load import config_file
 from tautscope.errors import ConfigError
@@ -20,29 +21,41 @@ MARK = "REPLACE"
 
 
 def placeholders(path: str | PathLike[str] | None) -> tuple[str, ...]:
-    """The keys with a placeholder in a TOML file that `load_config` reads, by dotted path."""
+    """The placeholders in a TOML file that `load_config` reads, by dotted path."""
     if path is None:
         return ()
     document = tomlkit.parse(config_file(path).read_text(encoding="utf-8"))
-    return tuple(_marked(document, ""))
+    return tuple(_in_body(document, ""))
 
 
-def refuse_placeholders(path: str | PathLike[str]) -> None:
+def refuse_placeholders(path: str | PathLike[str] | None) -> None:
     """Refuse a configuration with placeholders.
 
     Raises:
         ConfigError: Names the keys.
     """
     found = placeholders(path)
-    if found:
+    if path is not None and found:
         allowed = f"your values, and lines without the word {MARK}"
         raise ConfigError(", ".join(found), f"placeholders of {config_file(path)}", allowed)
 
 
-def _marked(table: Any, path: str) -> Iterator[str]:
-    for key, item in table.items():
-        place = f"{path}.{key}".lstrip(".")
-        if isinstance(item, dict):
-            yield from _marked(item, place)
-        elif isinstance(item, Item) and MARK in item.trivia.comment:
-            yield place
+def _marked(item: Any, place: str) -> Iterator[str]:
+    """The placeholders in an item of tomlkit."""
+    if isinstance(item, AoT):
+        for index, entry in enumerate(item):
+            yield from _marked(entry, f"{place}[{index}]")
+        return
+    is_inside = isinstance(item, Array) and MARK in item.as_string()
+    is_header = not (isinstance(item, Table) and item.is_super_table())  # else its first child's
+    if is_inside or (MARK in item.trivia.comment and is_header):
+        yield place
+    if isinstance(item, Table | InlineTable):
+        yield from _in_body(item.value, f"{place}.")
+
+
+def _in_body(container: Container, path: str) -> Iterator[str]:
+    # Not as a dictionary, which loses the headers of a table that is written in several parts.
+    for key, item in container.body:
+        if key is not None:
+            yield from _marked(item, f"{path}{key.key}")

@@ -48,9 +48,11 @@ def align_video(
         The estimate, and the stamps of the frames (m,) [s].
 
     Raises:
-        RecordError: There are fewer than two frames.
+        RecordError: There are fewer than two frames or motor positions.
         FrameError: The video is not from the configured camera.
     """
+    if len(times) < 2:
+        raise RecordError("motor positions", f"{len(times)} line", "at least 2")
     detector = MarkerDetector(config)
     starts, spread = workspace_starts(config)
     anywhere = StatePrediction(starts[0], spread)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import dataclass
 from os import PathLike
@@ -89,7 +90,7 @@ def export_rosbag(path: str | PathLike[str], folder: str | PathLike[str]) -> Rec
         MissingPathError, RecordError: As `recover`.
         OutputError: The folder is not empty, or cannot be written.
     """
-    name = f"{Path(folder).name}_0.mcap"
+    name = f"{Path(folder).absolute().name}_0.mcap"
     with new_folder(folder) as new:
         recovery = recover(path, new / name)
         (new / "metadata.yaml").write_text(_metadata(recovery, name), encoding="utf-8")
@@ -97,40 +98,33 @@ def export_rosbag(path: str | PathLike[str], folder: str | PathLike[str]) -> Rec
 
 
 def _metadata(recovery: Recovery, name: str) -> str:
-    entries = "".join(
-        f"""\
-    - topic_metadata:
-        name: {topic}
-        type: {kind}
-        serialization_format: cdr
-        offered_qos_profiles: ""
-      message_count: {recovery.messages.get(topic, 0)}
-"""
+    """As JSON, which is YAML."""
+    count = sum(recovery.messages.values())
+    timing = {
+        "duration": {"nanoseconds": recovery.last - recovery.first},
+        "starting_time": {"nanoseconds_since_epoch": recovery.first},
+        "message_count": count,
+    }
+    topics_with_count = [
+        {
+            "topic_metadata": {
+                "name": topic,
+                "type": kind,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": "",
+            },
+            "message_count": recovery.messages.get(topic, 0),
+        }
         for topic, kind in topics.TYPES.items()
-    )
-    count, duration = sum(recovery.messages.values()), recovery.last - recovery.first
-    timing = f"""\
-duration:
-    nanoseconds: {duration}
-  starting_time:
-    nanoseconds_since_epoch: {recovery.first}
-  message_count: {count}"""
-    return f"""\
-rosbag2_bagfile_information:
-  version: 5
-  storage_identifier: mcap
-  {timing}
-  topics_with_message_count:
-{entries}\
-  compression_format: ""
-  compression_mode: ""
-  relative_file_paths:
-    - "{name}"
-  files:
-    - path: "{name}"
-      starting_time:
-        nanoseconds_since_epoch: {recovery.first}
-      duration:
-        nanoseconds: {duration}
-      message_count: {count}
-"""
+    ]
+    information = {
+        "version": 5,
+        "storage_identifier": "mcap",
+        **timing,
+        "topics_with_message_count": topics_with_count,
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [name],
+        "files": [{"path": name, **timing}],
+    }
+    return json.dumps({"rosbag2_bagfile_information": information}, indent=2)

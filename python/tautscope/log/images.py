@@ -64,6 +64,8 @@ class ImageCodec:
         """
         kind = cv2.IMREAD_UNCHANGED if self._is_colour else cv2.IMREAD_GRAYSCALE
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), kind) if data else None
+        if pixels is not None and self._shape[2:] == (4,) and pixels.shape[2:] == (3,):
+            pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2BGRA)  # JPEG has no fourth channel
         image = None if pixels is None else np.asarray(pixels, dtype=np.uint8)
         if image is None or image.size != np.prod(self._shape):
             came = "no image" if image is None else f"an image {image.shape}"

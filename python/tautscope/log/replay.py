@@ -28,6 +28,7 @@ from tautscope.runs.run_recorder import RunRecorder, update_row
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
 
+_WITH_TICK = "a log with a tick before the first missing message"
 PREPARE = "prepare_detection "
 """Begin of the request to prepare the detection of a frame, before its sequence number."""
 SeenFrame = tuple[float, Frame, int]
@@ -73,7 +74,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
         The comparison, and the replayed run.
 
     Raises:
-        RecordError: The log has no tick, or a request that this version does not know.
+        RecordError: The log has no tick at its start, or a request that this version does not know.
     """
     loop = HysteresisReduction(log.config, log.compensated)
     comparison, recorder = Comparison(), RunRecorder(log.config)
@@ -109,6 +110,8 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             missing = "image" if event is not None else "tick, update or request"
             comparison.ended = f"{missing} {index} of {max(log.events)} is not in the log"
             break
+    if not comparison.ticks:
+        raise RecordError("log", comparison.ended, _WITH_TICK)
     return comparison, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
 
 
@@ -181,6 +184,7 @@ def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
         were skipped because their image is not in the log.
 
     Raises:
+        RecordError: The log has no tick.
         ConfigError: The configuration has other degrees of freedom than the log.
         FrameError: The configured camera is not the recorded one.
     """
@@ -189,6 +193,8 @@ def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
         allowed = f"those of the log: {', '.join(recorded)}"
         raise ConfigError("dof", ", ".join(given), allowed)
     run = _estimate(_log_inputs(log), config, log.compensated)
+    if not len(run.trace):
+        raise RecordError("log", "no tick", _WITH_TICK)
     skipped = sum(
         isinstance(event, Update) and not log.has_input(index)
         for index, event in log.events.items()

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 
 from tautscope.config import Config
+from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
+from tautscope.errors import FieldError
 from tautscope.log import messages as msg
 from tautscope.log.header import RunInfo
 from tautscope.log.journal import POLL_PERIOD, Journal
@@ -99,6 +101,7 @@ class LogWriter:
         image_format: Of the next images; `recording.image_format` at first, may be set.
 
     Raises:
+        FieldError: `image_format` is set to another one than those of `recording.image_format`.
         OutputError: The file exists already, or cannot be created or written.
     """
 
@@ -118,6 +121,17 @@ class LogWriter:
         self._ticks = self._updates = self._index = 0
         info = RunInfo(config, compensate, tuple(segments))
         self._journal = Journal(Path(path), info, on_warning)
+
+    @property
+    def image_format(self) -> ImageFormat:
+        """See the class."""
+        return self._image_format
+
+    @image_format.setter
+    def image_format(self, name: ImageFormat) -> None:
+        if name not in IMAGE_FORMATS:
+            raise FieldError("image_format", name, f"one of {', '.join(IMAGE_FORMATS)}")
+        self._image_format = name
 
     def tick(
         self,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 TIME = "time"
-"""Title of the column of the time [s], since the first message."""
+"""Title of the column of the time."""
 SUFFIXES = (".mcap", ".db3")
 _WIDEST = 64
 """Most numbers of an array that become columns: a longer one is no set of positions."""
@@ -109,7 +109,7 @@ def _table(groups: dict[tuple[str, ...], _Rows]) -> pl.DataFrame:
         named = {f"{prefix}/{title}": each for title, each in zip(titles, columns, strict=True)}
         frames.append(pl.DataFrame({TIME: stamped if is_stamped else logged} | named))
     table = pl.concat(frames, how="diagonal").sort(TIME, maintain_order=True)
-    return table.with_columns((pl.col(TIME) - pl.col(TIME).min()) / 1e9)
+    return table.with_columns(pl.col(TIME).cast(pl.Datetime("ns")))
 
 
 def _reader(types: Typestore, kind: str) -> Callable[[Any], Iterator[Part]] | None:

@@ -23,8 +23,14 @@ _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
 _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 
 
-def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]) -> Floats:
-    """A column as numbers; times become seconds since the first one."""
+def numbers(
+    series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]
+) -> tuple[Floats, int]:
+    """A column as numbers; dates and times of day become seconds since the first one.
+
+    Returns:
+        Numbers, and the date or time of day [ns] from which they count, 0 where they are none.
+    """
     import polars as pl  # noqa: PLC0415
 
     if series.dtype.is_temporal():
@@ -46,7 +52,7 @@ def numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np
         where = f"{file}, {line} {rows[index]}, column {name}"
         raise RecordError(where, text[index], _ALLOWED)
     found = values.fill_null(float("nan")).to_numpy().astype(np.float64)
-    return np.where(np.abs(found) < 1 / LARGEST, 0.0, found)
+    return np.where(np.abs(found) < 1 / LARGEST, 0.0, found), 0
 
 
 def _is_too_large(values: pl.Series) -> pl.Series:
@@ -85,8 +91,8 @@ def _times(text: pl.Series) -> pl.Series | None:
     )
 
 
-def _seconds(times: pl.Series) -> Floats:
-    """Seconds since the first time; NaN where there is none."""
+def _seconds(times: pl.Series) -> tuple[Floats, int]:
+    """Seconds since the first time, NaN where there is none; and the first time [ns]."""
     import polars as pl  # noqa: PLC0415
 
     if times.dtype == pl.Duration:
@@ -95,6 +101,7 @@ def _seconds(times: pl.Series) -> Floats:
         ticks = times.cast(pl.Int64)
     else:
         ticks = times.cast(pl.Datetime("ns")).cast(pl.Int64)
-    first = ticks.drop_nulls()
-    relative = ticks - (first[0] if len(first) else 0)
-    return (relative.cast(pl.Float64) / 1e9).fill_null(float("nan")).to_numpy().astype(np.float64)
+    known = ticks.drop_nulls()
+    first = int(known[0]) if len(known) else 0
+    seconds = ((ticks - first).cast(pl.Float64) / 1e9).fill_null(float("nan"))
+    return seconds.to_numpy().astype(np.float64), first

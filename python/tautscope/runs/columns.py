@@ -67,7 +67,7 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
     time = time_column(sheet.titles)
     for index, title in enumerate(sheet.titles):
         try:
-            values = sheet.values(index, title)
+            values, _ = sheet.values(index, title)
         except RecordError:
             continue
         seen = values[np.isfinite(values)]

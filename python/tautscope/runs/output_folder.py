@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from os import PathLike
 from pathlib import Path
 
@@ -45,14 +45,15 @@ def check_free_file(path: str | PathLike[str]) -> Path:
 
 
 def check_writable(path: Path) -> None:
-    """Check that something can be made at a path, by making and removing a folder above it.
+    """Check that something can be made at a path, by making and removing a folder in or above it.
 
     Raises:
         OutputError: It cannot.
     """
     from tempfile import TemporaryDirectory  # noqa: PLC0415  a tenth of the time to import the loop
 
-    above = next(folder for folder in path.absolute().parents if folder.exists())
+    path = path.resolve()
+    above = next(folder for folder in (path, *path.parents) if folder.is_dir())
     try:
         with TemporaryDirectory(prefix=".tautscope-", dir=above):
             pass
@@ -77,14 +78,22 @@ def new_file(path: str | PathLike[str]) -> Iterator[Path]:
         yield partial
         partial.rename(target)
     except OSError as error:
-        raise OutputError("out", str(target), f"a place that can be written ({error})") from None
+        raise _as_output(error, target, partial) from None
     finally:
         partial.unlink(missing_ok=True)
 
 
+def _as_output(error: OSError, target: Path, partial: Path) -> OSError | OutputError:
+    """The error of an output, unless it names another file, such as an input."""
+    if not str(error.filename or partial).startswith(str(partial)):
+        return error
+    return OutputError("out", str(target), f"a place that can be written ({error})")
+
+
 def default_folder(verb: str) -> Path:
-    """runs/<date-time>-<verb>."""
-    return Path("runs") / f"{time.strftime('%Y-%m-%d-%H%M%S')}-{verb}"
+    """runs/<date-time>-<verb>, to the millisecond: commands may start in the same second."""
+    now = f"{datetime.now():%Y-%m-%d-%H%M%S-%f}"[:-3]
+    return Path("runs") / f"{now}-{verb}"
 
 
 @contextmanager
@@ -92,27 +101,44 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
     """Make a folder that gets its name only when the block has ended without an error.
 
     Yields:
-        A temporary folder beside it to write into: renamed at the end, removed on an error.
+        A temporary folder to write into, beside the new one or in one that exists, which may be a
+        mount point. It is removed on an error, but not if only its name was taken meanwhile.
 
     Raises:
         OutputError: The path is taken, or cannot be written.
     """
-    target = check_free(path).absolute()
-    partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
+    target = check_free(path).resolve()
+    is_new = not target.exists()
+    partial = (target.parent if is_new else target) / f".{target.name}.{os.getpid()}.partial"
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        partial.mkdir()
+        partial.mkdir(parents=True)
     except OSError as error:
         raise OutputError("out", str(target), f"a place that can be written ({error})") from None
     try:
         yield partial
-        if check_free(target).exists():
-            target.rmdir()
-        partial.rename(target)
-        _LOG.info("written: %s", target)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise _as_output(error, target, partial) from None
         raise
+    try:
+        if is_new:
+            partial.rename(target)
+        else:
+            _move_up(partial)
+    except OSError as error:
+        allowed = f"still free at the end ({error}); the results are in {partial}"
+        raise OutputError("out", str(target), allowed) from None
+    _LOG.info("written: %s", target)
+
+
+def _move_up(partial: Path) -> None:
+    """Move what a folder has into the one above, in which there is nothing else."""
+    if [*partial.parent.iterdir()] != [partial]:
+        raise OSError("it is no longer empty")
+    for each in partial.iterdir():
+        each.rename(partial.parent / each.name)
+    partial.rmdir()
 
 
 @contextmanager
@@ -125,7 +151,11 @@ def recording_saved(folder: Path) -> Iterator[None]:
         yield
     except MotionHeldError as error:
         if error.recording is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            error.recording.write(folder, "" if error.recording.compensated else "_uncompensated")
-            error.add_note(f"What was recorded until then: {folder}")
+            suffix, note = "" if error.recording.compensated else "_uncompensated", str(folder)
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                error.recording.write(folder, suffix)
+            except OSError as failure:  # the held motion is the more important error
+                note = f"not written ({failure})"
+            error.add_note(f"What was recorded until then: {note}")
         raise

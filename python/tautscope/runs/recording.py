@@ -81,9 +81,10 @@ class Recording:
             [m or rad] `reference_*`, `command_*` (given at this time), `applied_*` and
             `true_*` (at this time; truth is NaN if the rig has none), `estimate_*`,
             `delta_minus_*`, `delta_plus_*` (of the newest frame); `status` of that frame.
-        frames: Structured array, one row per image: `captured_at`, `arrived_at` [s], `sequence`,
-            `status`, `valid`; per DOF `estimate_*`, `predicted_*`, `true_*` (at the capture time,
-            interpolated), `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
+        frames: Structured array, one row per image: `captured_at` (of a measurement its stamp less
+            `measurement.delays`), `arrived_at` [s], `sequence`, `status`, `valid`; per DOF
+            `estimate_*`, `predicted_*`, `true_*` (at the capture time, interpolated),
+            `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
             `innovation_*`, `true_features_*`. Of a robot with [[dof]] a row per measurement,
             without features.
         config: The configuration of the run.

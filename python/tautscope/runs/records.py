@@ -106,8 +106,8 @@ def read_record(
             is open, for several records of it.
         command: Column of the actuator position.
         measured: Column of the tip position.
-        time: Column of the time, in the unit of its title; without one in s, or since 1970 in s,
-            ms, us or ns by its size; or a date or time of day.
+        time: Column of the time: in the unit of its title, without one in s, or since 1970 by its
+            size; or dates or times of day.
         tip_path: File of the tip, with a time of the same clock, if it is not in the first.
         missing: Values that stand for none, such as -9999.
 
@@ -119,13 +119,14 @@ def read_record(
     """
     sheet = path if isinstance(path, Sheet) else open_table(path)
     if tip_path is None:
-        table, rows, units = _read(sheet, (command, measured), time)
+        table, rows, units, _ = _read(sheet, (command, measured), time)
     else:
         tips = tip_path if isinstance(tip_path, Sheet) else open_table(tip_path)
         if time is None:
             raise RecordError(tips.file, "no time", "a column of the time in both files")
-        motor, motor_rows, motor_units = _read(sheet, (command,), time)
-        tip, tip_rows, tip_units = _read(tips, (measured,), time)
+        motor, motor_rows, motor_units, motor_start = _read(sheet, (command,), time)
+        tip, tip_rows, tip_units, tip_start = _read(tips, (measured,), time)
+        tip[:, -1] += (tip_start - motor_start) / 1e9  # dates count from the first of each file
         nothing = [np.full((len(each), 1), np.nan) for each in (motor, tip)]
         table = np.vstack(
             [
@@ -154,19 +155,22 @@ def read_record(
 
 def _read(
     sheet: Sheet, names: tuple[str, ...], time: str | None
-) -> tuple[Floats, NDArray[np.int64], tuple[str, ...]]:
-    """Columns, the last one the time [s] if there is one, their lines, and units."""
+) -> tuple[Floats, NDArray[np.int64], tuple[str, ...], int]:
+    """Columns, the last one the time [s] if there is one; lines, units, start [ns]."""
     wanted = names if time is None else (*names, time)
     found = sheet.read(wanted)
     table = np.stack([found.columns[name] for name in wanted], axis=1)
     if time is not None:
         stamps = table[:, -1]
+        if not np.isfinite(stamps).any():
+            raise RecordError(f"{sheet.file}, column {time}", "no time", "one in each line")
         unit = found.units.get(time, "")
         if unit and unit not in TIMES:
             allowed = f"one of {', '.join(TIMES)}"
             raise RecordError(f"{sheet.file}, column {time}", f"unit {unit}", allowed)
         table[:, -1] = stamps * (TIMES[unit] if unit else time_scale(float(np.nanmedian(stamps))))
-    return table, found.rows, tuple(found.units.get(name, "") for name in names)
+    units = tuple(found.units.get(name, "") for name in names)
+    return table, found.rows, units, 0 if time is None else found.starts[time]
 
 
 def read_motors(

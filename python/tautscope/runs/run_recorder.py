@@ -43,7 +43,7 @@ def update_row(now: float, seen: Frame | Measurement, report: Report, count: int
         truth = _NO_FEATURES if seen.true_features is None else seen.true_features
         features = (*found, *report.predicted_features, *report.innovation, *truth)
     return (
-        seen.captured_at,
+        report.captured_at,
         now,
         count,
         str(report.status),

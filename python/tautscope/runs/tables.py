@@ -41,11 +41,13 @@ class Table:
         columns: Name as asked for -> (n,) values; NaN where there is none. Times of day and dates
             are seconds since the first one.
         units: Name as asked for -> unit of the header or the line of units, if there is one.
+        starts: Name as asked for -> the first date or time of day [ns]; 0 of other columns.
         rows: (n,) line of a CSV file, from 1 on; of other files the row, from 1 on.
     """
 
     columns: dict[str, Floats]
     units: dict[str, str]
+    starts: dict[str, int]
     rows: NDArray[np.int64]
 
 
@@ -75,24 +77,24 @@ class Sheet:
 
     def read(self, names: Sequence[str]) -> Table:
         """The columns with these titles, see `read_table`."""
-        columns, units = {}, {}
+        columns, units, starts = {}, {}, {}
         for name in names:
             index = self.index(name)
             title = self.titles[index]
             check_unit(f"{self.file}, column {title}", title)
-            columns[name] = self.values(index, name)
+            columns[name], starts[name] = self.values(index, name)
             if unit := self.unit(index):
                 units[name] = unit
         if not self.is_merged:
-            return Table(columns, units, self.rows)
+            return Table(columns, units, starts, self.rows)
         asked = [self.index(name) for name in names]
         signals = [k for k in asked if self.titles[k] != bags.TIME] or asked
         is_own = np.any([self.frame.to_series(k).is_not_null() for k in signals], axis=0)
         kept = {name: values[is_own] for name, values in columns.items()}
-        return Table(kept, units, self.rows[is_own])
+        return Table(kept, units, starts, self.rows[is_own])
 
-    def values(self, index: int, name: str) -> Floats:
-        """(n,) numbers of a column."""
+    def values(self, index: int, name: str) -> tuple[Floats, int]:
+        """(n,) numbers of a column, and the date or time of day [ns] from which they count."""
         return numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
 
     def unit(self, index: int) -> str:
@@ -158,7 +160,7 @@ def with_axes(sheet: Sheet) -> Sheet:
     added: list[pl.Series] = []
     for prefix, columns in find_axes(sheet.titles):
         try:
-            values = np.stack([sheet.values(k, sheet.titles[k]) for k in columns], axis=1)
+            values = np.stack([sheet.values(k, sheet.titles[k])[0] for k in columns], axis=1)
         except RecordError:
             continue
         if len(columns) == 4:
