@@ -97,7 +97,7 @@ def test_a_video_and_an_image_with_clicks_agree(
 
 def test_a_page_takes_the_clicks(capsys: Capture, tmp_path: Path) -> None:
     image = np.random.default_rng(0).integers(0, 255, (20, 30, 3), np.uint8)
-    file, page = tmp_path / "a&b.png", tmp_path / "click.html"
+    file, page = tmp_path / "a &b.png", tmp_path / "click.html"
     cv2.imwrite(str(file), image)
     assert main([*COMMAND, str(file), "--page", str(page)]) == 0
     assert str(page) in capsys.readouterr().out
@@ -105,7 +105,7 @@ def test_a_page_takes_the_clicks(capsys: Capture, tmp_path: Path) -> None:
     code = text.partition("data:image/png;base64,")[2].partition('"')[0]
     pixels = cv2.imdecode(np.frombuffer(base64.b64decode(code), np.uint8), cv2.IMREAD_COLOR)
     assert np.array_equal(pixels, image)
-    assert 'a&amp;b.png"></pre>' in text
+    assert 'a &amp;b.png&#x27;"></pre>' in text
     assert "http" not in text
     assert "does not exist yet" in failed(capsys, *COMMAND, str(file), "--page", str(page))
 

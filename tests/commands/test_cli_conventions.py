@@ -128,6 +128,12 @@ def test_an_output_folder_is_checked_first(
     assert "out: got '/proc/nowhere/out', expected a place that can be written" in err
 
 
+def test_negative_numbers_may_have_an_exponent() -> None:
+    jog = ["jog", "insertion", "-1e-3", "--config", "rig.toml"]
+    assert _parser().parse_args(jog).distance == -1e-3
+    assert _parser().parse_args(["analyze", "a.csv", "--missing", "-1E+30"]).missing == [-1e30]
+
+
 @pytest.mark.parametrize("verb", ["analyze", "replay", "report", "recover"])
 def test_a_file_that_cannot_be_read_is_named(capsys: Capture, tmp_path: Path, verb: str) -> None:
     name = str(tmp_path / (300 * "x"))

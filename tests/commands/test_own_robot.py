@@ -128,6 +128,10 @@ def test_a_rig_that_fails_leaves_what_it_did(
     ("options", "message"),
     [
         (["--rig", "catheter_of_a_newcomer"], "rig: got 'catheter_of_a_newcomer'"),
+        (
+            ["--rig", "./catheter_of_a_newcomer.py:Catheter"],
+            "rig: got './catheter_of_a_newcomer.py",
+        ),
         (["--rig", "no_module:Rig"], "rig: got 'no_module:Rig'"),
         (["--rig", "catheter_of_a_newcomer:Nothing"], "rig: got"),
         (["--rig", "catheter_of_a_newcomer:np"], "rig: got"),
@@ -339,6 +343,17 @@ def test_doctor_approves_of_the_rig_of_thirty_lines(
     assert found["degrees of freedom"]["status"] == "ok"
     assert {each["status"] for each in found.values()} == {"ok", "note"}
     assert found["pace"]["status"] == found["measurement.delays"]["status"] == "note"
+
+
+def test_doctor_says_that_a_calibration_is_old(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = '[calibration.robot]\ndate = "2001-01-01T00:00:00+00:00"\n'
+    (folder / "robot.toml").write_text(ROBOT + old, encoding="utf-8")
+    assert doctor(folder, monkeypatch, RIG, "--yes", "--json") == 0
+    found = {each["what"]: each for each in json.loads(capsys.readouterr().out)["findings"]}
+    assert found["robot"]["status"] == "note"
+    assert "stale" in found["robot"]["found"]
 
 
 @pytest.mark.parametrize(

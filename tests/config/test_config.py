@@ -1,6 +1,7 @@
 """Configuration: defaults, files, and errors that name the key."""
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tautscope.config import (
     Sine,
     TwinConfig,
     VisionConfig,
+    axes,
     dump_config,
     from_document,
     load_config,
@@ -195,6 +197,22 @@ def test_replace_checks_and_does_not_change_the_original() -> None:
     assert config == Config()
     with pytest.raises(AttributeError):
         config.twin.seed = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("path", ["profile.x", "camera.fx.y", "dof.x"])
+def test_replace_refuses_a_key_below_a_value(path: str) -> None:
+    with pytest.raises(ConfigError, match=rf"{re.escape(path)}: got 1, expected no such key"):
+        Config().replace(**{path: 1})
+
+
+def test_a_delay_is_within_the_history() -> None:
+    config = axes(1, width_limit=1.0)
+    longest = config.control.history
+    config.replace(**{"measurement.delays": [0.0, longest]})
+    with pytest.raises(
+        ConfigError, match=r"measurement\.delays\[1\]: got .*at most control\.history"
+    ):
+        config.replace(**{"measurement.delays": [0.0, 1.01 * longest]})
 
 
 def test_an_empty_document_is_the_default() -> None:

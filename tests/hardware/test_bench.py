@@ -17,6 +17,7 @@ from drawn import with_half_images
 from drive_settings import drives_document
 from tautscope.bench.ground_truth import GroundTruthWriter, read_ground_truth
 from tautscope.bench.rig import Bench
+from tautscope.cli import main
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
@@ -133,6 +134,28 @@ def test_error_names_a_socket_that_cannot_be_made(tmp_path: Path) -> None:
         Bench(nowhere).__enter__()
     with pytest.raises(OutputError, match=r"--truth.*No such file"):
         Bench(config, tmp_path / "none" / "truth.csv")
+
+
+@pytest.mark.parametrize("fault", ["1 drop rotatoin", "1 explode camera", "1 unplug rotation"])
+def test_wrong_faults_are_refused_at_the_start(
+    fault: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bench.toml"
+    file.write_text(dump_config(bench_config(tmp_path)))
+    assert main(["bench", "--config", str(file), "--faults", "0 drop camera", fault]) == 2
+    printed = capsys.readouterr()
+    assert f"--faults: got '{fault[2:]}'" in printed.err
+    assert printed.out == ""
+
+
+def test_a_file_in_the_place_of_the_truth_is_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.csv"
+    file.write_text("mine")
+    assert main(["bench", "--truth", str(file)]) == 2
+    assert "--truth: got" in capsys.readouterr().err
+    assert file.read_text() == "mine"
 
 
 def test_unknown_fault_requests_are_refused(tmp_path: Path) -> None:

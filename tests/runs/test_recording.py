@@ -143,6 +143,16 @@ def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) ->
     trace.write_text(whole[: len(whole) // 2].rsplit(",", 3)[0])
     with pytest.raises(RecordError, match=r"trace\.csv"):
         Recording.load(folder)
+    facts = folder / "recording.toml"
+    for path, data in (
+        (trace, whole.encode() + b"\xff\n"),
+        (trace, whole.encode() + 200_000 * b"1"),
+        (facts, b"\xff"),
+        (facts, facts.read_bytes().replace(b"start = ", b"start = 'soon' # ", 1)),
+    ):
+        path.write_bytes(data)
+        with pytest.raises(RecordError, match=path.name):
+            Recording.load(folder)
 
 
 def test_runs_in_worker_processes_are_identical(

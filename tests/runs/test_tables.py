@@ -243,6 +243,30 @@ def test_numbers_that_could_mean_two_things_are_refused(tmp_path: Path) -> None:
         read_record(file, "a", "b")
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["time,motor,tip\n", f"time,motor,tip\n0,1,{200_000 * '3'}\n1,2,3\n", 200_000 * "x"],
+    ids=["titles alone", "a long number", "a long word"],
+)
+def test_a_table_without_numbers_to_use_is_refused(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text(text)
+    for time in (None, "time"):
+        with pytest.raises(RecordError):
+            read_record(file, "motor", "tip", time)
+
+
+def test_poses_of_several_groups_may_have_the_same_titles(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    rows = "".join(f"{k},{k % 5},1,2,{k % 7},1,2\n" for k in range(9))
+    titles = "t,tip_x,tip_y,tip_z,tip_x,tip_y,tip_z\n"
+    file.write_text(",Tracker,,,Camera,,\n" + titles + rows)
+    expected = [k % 7 for k in range(9)]
+    np.testing.assert_array_equal(
+        read_table(file, ["Camera/tip_x"]).columns["Camera/tip_x"], expected
+    )
+
+
 def test_a_damaged_gzip_file_is_named(tmp_path: Path) -> None:
     file = tmp_path / "log.csv.gz"
     file.write_bytes(gzip.compress(b"a,b\n1,2\n" * 99)[:-12])

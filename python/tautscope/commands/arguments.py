@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,6 +14,7 @@ from tautscope.config import RIGS, Config, Profile, load_config
 from tautscope.errors import ConfigError
 from tautscope.runs.output_folder import check_free, default_folder
 
+_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
@@ -36,6 +38,8 @@ def add_verb(
         extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
     """
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
+    # Of itself argparse takes a negative number with an exponent for an option.
+    parser._negative_number_matcher = _NEGATIVE
     parser.set_defaults(run=run, extras=tuple(extras), usage_error=parser.error)
     add_verbose(parser, default=argparse.SUPPRESS)
     return parser

@@ -7,13 +7,15 @@ import json
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.requests import read_requests
 from tautscope.commands import arguments
-from tautscope.errors import ConfigError
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.signals import exit_on_signals
 
 if TYPE_CHECKING:
@@ -69,8 +71,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _fault(text: str) -> tuple[float, str]:
     seconds, _, request = text.partition(" ")
     try:
-        return float(seconds), request
-    except ValueError:
+        return arguments.seconds(seconds), request
+    except argparse.ArgumentTypeError:
         raise argparse.ArgumentTypeError(f"got {text!r}, expected 'SECONDS KIND PART'") from None
 
 
@@ -83,6 +85,8 @@ def _bench(options: argparse.Namespace) -> None:
     )
 
     config = arguments.article_config(options.config)
+    if options.truth is not None and options.truth.is_file():
+        raise OutputError("--truth", str(options.truth), "a file that does not exist yet")
     if options.drawn is not None:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 
@@ -93,6 +97,7 @@ def _bench(options: argparse.Namespace) -> None:
         realtime_process(SETPOINTS) as refusal,
         Bench(config, options.truth, modes=tuple(options.modes)) as bench,
     ):
+        _check_faults(bench, options.faults)
         if refusal:
             print(f"warning: {refusal}", file=sys.stderr, flush=True)
         print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
@@ -114,6 +119,22 @@ def _bench(options: argparse.Namespace) -> None:
             stopping.set()
             injector.join()
             printer.close()
+
+
+def _check_faults(bench: Bench, faults: Iterable[tuple[float, str]]) -> None:
+    """Check that a bench has the faults of ``--faults``.
+
+    Raises:
+        ConfigError: It has not.
+    """
+    from tautscope.bench.camera import FAULTS  # noqa: PLC0415
+
+    kinds = dict.fromkeys((dof.label for dof in Dof), bench.drives.kinds) | {"camera": FAULTS}
+    for _, request in faults:
+        kind, _, part = request.partition(" ")
+        if kind not in ("clear", *kinds.get(part, ())):
+            allowed = "; ".join(f"{', '.join(kinds[each])} of {each}" for each in kinds)
+            raise ConfigError("--faults", request, f"KIND PART, with {allowed}; or clear PART")
 
 
 _ENABLED = ("operation enabled", "torque on", "enabled")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import shlex
 from html import escape
 from pathlib import Path
 
@@ -57,7 +58,7 @@ def write_click_page(image_file: Path, page: Path) -> None:
     image = read_image(image_file)
     check_free_file(page)
     _, data = cv2.imencode(".png", image)
-    command = f"tautscope calibrate colour {image_file}"
+    command = shlex.join(["tautscope", "calibrate", "colour", str(image_file)])
     text = _PAGE.replace("COMMAND", escape(command, quote=True))
     text = text.replace("PIXELS", base64.b64encode(data.tobytes()).decode())
     page.write_text(text, encoding="utf-8")

@@ -110,6 +110,8 @@ def _check_own(
         yield from of_drives
         if any(each.status == "missing" for each in of_drives):
             return
+    kinds = [kind for kind in ("robot", "latency") if getattr(config.calibration, kind) is not None]
+    yield from check_calibration(config.calibration, {}, kinds=kinds)
     rig = make(config)
     try:
         period = f"control_period {1e3 * config.control.period:g} ms, as control.period"

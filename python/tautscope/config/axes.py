@@ -131,8 +131,8 @@ class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     """Sensors of a robot with [[dof]]; deviations are of measurements without a covariance."""
 
     delays: Annotated[tuple[NonNegative, ...], Meta(max_length=4)] = ()
-    """How much earlier than its stamps say each sensor measures [s], by `tautscope calibrate
-    latency --rig`."""
+    """How much earlier than its stamps say each sensor measures [s], at most `control.history`, by
+    `tautscope calibrate latency --rig`."""
 
     tip_deviation: Positive = 0.01
     """Of a tip that is measured degree by degree [in width_limit]."""

@@ -19,10 +19,11 @@ from tautscope.config.drives import DrivesConfig
 from tautscope.config.experiment import ExperimentConfig, InstrumentConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
-from tautscope.config.section import Section, converted_value, without_numpy
+from tautscope.config.section import Section, converted_value, require, without_numpy
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
 from tautscope.dof import Dof, NamedDof
+from tautscope.errors import ConfigError
 
 _LOG = logging.getLogger(__name__)
 
@@ -83,6 +84,9 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         check_axes(self.dof, self.kinematics, self.safety)
         check_ranges(self)
         check_topics(self.dof, self.kinematics, self.measurement)
+        for index, delay in enumerate(self.measurement.delays):
+            allowed = f"at most control.history = {self.control.history:g}"
+            require(delay <= self.control.history, f"measurement.delays[{index}]", delay, allowed)
         if self.actuators is not None:
             check_actuators(self.actuators, self.dof)
         if self.drives is not None:
@@ -110,6 +114,8 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
             place = document
             for section in sections:
                 place = place.setdefault(section, {})
+                if not isinstance(place, dict):
+                    raise ConfigError(path, value, f"no such key: {section} has none below it")
             place[key] = value
         return _checked(document)
 

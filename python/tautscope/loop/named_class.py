@@ -18,7 +18,7 @@ def named_class(field: str, name: str, allowed: str) -> Any:
             `allowed`.
     """
     module, _, attribute = name.partition(":")
-    if not module or not attribute:
+    if not module or not attribute or module.startswith("."):
         raise ConfigError(field, name, allowed)
     here = str(Path.cwd())
     if here not in sys.path:

@@ -179,7 +179,7 @@ class Recording:
             facts = facts_file.read_text(encoding="utf-8")
             config = load_config(place / "config.toml")
             compensated, segments = read_run_facts(facts, config)
-        except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError) as error:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
         return cls(
@@ -208,11 +208,13 @@ def read_run_facts(text: str, config: Config) -> tuple[bool, tuple[Segment, ...]
             freedom.
     """
     facts, dofs = tomllib.loads(text), {dof.label: dof for dof in config.dofs}
-    segments = tuple(
-        Segment(dofs[item["dof"]], item["start"], item["period"], item["periods"])
-        for item in facts["segments"]
-    )
-    return bool(facts["compensated"]), segments
+    segments = []
+    for item in facts["segments"]:
+        numbers = item["start"], item["period"], item["periods"]
+        if not all(isinstance(each, int | float) for each in numbers):
+            raise TypeError(f"start, period and periods are numbers, not {numbers}")
+        segments.append(Segment(dofs[item["dof"]], *numbers))
+    return bool(facts["compensated"]), tuple(segments)
 
 
 def per_dof(table: Table, group: str, dofs: Iterable[NamedDof] = Dof) -> Floats:
@@ -242,8 +244,11 @@ def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
     """
     if not path.is_file():
         raise MissingPathError("recording", str(path), "a file of a saved recording")
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordError(str(path), str(error), "a table of a saved recording") from None
     names = dtype.names or ()
     if tuple(header) != names:
         raise RecordError(str(path), ",".join(header), f"the columns {', '.join(names)}")

@@ -150,6 +150,8 @@ def _delimiter(head: list[str]) -> str:
 def _cells(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
+    if len(line) > csv.field_size_limit():  # which the reader refuses; it is no line of titles
+        return [cell.strip() for cell in line.split(delimiter)]
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
 
 

@@ -171,7 +171,7 @@ def with_axes(sheet: Sheet) -> Sheet:
                 title_of(prefix, "travel") + (f" [{unit}]" if unit else ""),
                 travel(values),
             )
-        if found is not None and title not in sheet.titles:
+        if found is not None and title not in (*sheet.titles, *(each.name for each in added)):
             added.append(pl.Series(title, found, nan_to_null=True))
     titles = [*sheet.titles, *(each.name for each in added)]
     return replace(sheet, frame=sheet.frame.hstack(added), titles=titles)

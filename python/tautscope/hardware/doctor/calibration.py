@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
 from tautscope.config import CalibrationConfig, CalibrationRecord
@@ -16,9 +16,12 @@ _CLOCK_TOLERANCE = 60.0
 
 
 def check_calibration(
-    config: CalibrationConfig, serial_numbers: Mapping[str, str], now: datetime | None = None
+    config: CalibrationConfig,
+    serial_numbers: Mapping[str, str],
+    now: datetime | None = None,
+    kinds: Iterable[str] = CALIBRATIONS,
 ) -> list[CheckResult]:
-    """Check the records of all calibrations.
+    """Check the records of calibrations.
 
     A calibration of other devices, or older than one that it builds on, is missing: its values do
     not belong to this rig. One that was never done with ``tautscope calibrate``, or is older than
@@ -28,8 +31,9 @@ def check_calibration(
         config: Section ``calibration``.
         serial_numbers: Those of the devices that are connected, as far as known.
         now: Present time.
+        kinds: The calibrations, by default all of the article's instrument.
     """
-    return [_check(kind, config, serial_numbers, now or datetime.now(UTC)) for kind in CALIBRATIONS]
+    return [_check(kind, config, serial_numbers, now or datetime.now(UTC)) for kind in kinds]
 
 
 def _check(
