@@ -59,9 +59,8 @@ def test_the_camera_is_calibrated_with_a_board_that_leaves_again(
 
 
 def test_the_colour_is_calibrated_by_moving_the_drives(
-    rig: tuple[Config, Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    rig: tuple[Config, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tautscope.calibration.bands.motion.MOST_IMAGES", 30)
     config, file = rig
     with Bench(draw_rig(config, SEED).replace(**STILL)):
         assert main(["calibrate", "colour", "--config", str(file), "--yes", "--write"]) == 0
