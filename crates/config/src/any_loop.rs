@@ -62,6 +62,7 @@ const MOST_TICKS: usize = 1024;
 /// They are more than a history has.
 pub(crate) fn entries(control: &core::ControlSettings) -> Result<usize, core::ConfigError> {
     let found = core::history_entries(control.history, control.period);
+    // Two beside the periods: `history_entries`.
     if found > MOST_TICKS + 2 {
         return Err(core::ConfigError {
             field: "history",

@@ -111,7 +111,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        // With an outlier nothing but the offset is learnt.
+        // With an outlier nothing but the offset is learnt; of bands `merged` says so.
         let is_learnt = I::IS_WHOLE || !measurement.has_outlier;
         let determined = measurement.observable.map(|own| own && is_learnt);
         let is_missing = self.is_missing(past.travel, determined);

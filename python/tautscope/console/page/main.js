@@ -65,7 +65,7 @@ const control = new Link("/control", token, {
       if (!layout) build(message.layout);
     } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
-      // An element with the focus does not show the state, which is another than asked for.
+      // A control with the focus keeps showing what was asked for; without it, it shows what is.
       if (!isAccepted && !isText(document.activeElement)) document.activeElement?.blur();
       reply(`${what}: ${isAccepted ? "done" : "refused"}${reason && `, ${reason}`}`, !isAccepted);
     } else {
