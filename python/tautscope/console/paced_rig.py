@@ -77,15 +77,16 @@ class PacedRig:
 
     def close(self) -> None:
         """Stop the motors; the next `reset` makes another rig."""
-        rig, self._rig = self._rig, None
-        if rig is not None:
-            self._checked(rig.close)
+        self._end(lambda rig: rig.close())
 
     def disable(self) -> None:
         """Like `close`, and disable the motors of a rig that can, as a `MotorRig`."""
+        self._end(disable)
+
+    def _end(self, end: Callable[[Rig], None]) -> None:
         rig, self._rig = self._rig, None
         if rig is not None:
-            self._checked(lambda: disable(rig))
+            self._checked(lambda: end(rig))
 
     @staticmethod
     def _checked(call: Callable[[], T]) -> T:
