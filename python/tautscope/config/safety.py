@@ -90,9 +90,9 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Ratio of a swing to the last one, from which it grows."""
     cycle_time: Positive = 2.0
     """Longest swing of a limit cycle, one way [s]."""
-    hold_time: NonNegative = 4.0
+    hold_time: NonNegative = 8.0
     """Time after which a flag that is still raised goes to its next reaction [s]."""
-    hold_travel: NonNegative = 4.0
+    hold_travel: NonNegative = 8.0
     """Travel of the reference, summed over all DOFs, after which it does so too [in
     width_limit]."""
     fade_travel: Positive = 2.0
