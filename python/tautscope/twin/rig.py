@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.loop.rig import Frame, Sample
-from tautscope.twin.camera import TwinCamera
+from tautscope.twin.camera import RenderedImage, TwinCamera
 from tautscope.twin.plant import Plant
-from tautscope.twin.sensor import Readout
+from tautscope.twin.sensor import Centreline, Readout
 
 
 class Twin:
@@ -63,7 +63,9 @@ class Twin:
         Raises:
             SignalError: Before `reset` or after `close`.
         """
-        return self._require_plant()
+        if self._plant is None:
+            raise SignalError("rig", "closed", "a twin after reset() and before close()")
+        return self._plant
 
     @property
     def control_period(self) -> float:
@@ -77,11 +79,11 @@ class Twin:
         Raises:
             ConfigError: The value is outside the range of `twin.bends`.
         """
-        return self._require_plant().bends
+        return self.plant.bends
 
     @bends.setter
     def bends(self, value: float) -> None:
-        self._require_plant().bends = self._config.replace(**{"twin.bends": value}).twin.bends
+        self.plant.bends = self._config.replace(**{"twin.bends": value}).twin.bends
 
     def reset(self) -> Sample:
         """Start with a new instrument, settled in the start posture, at time 0."""
@@ -103,7 +105,7 @@ class Twin:
         Raises:
             SignalError: The command is not three finite numbers.
         """
-        plant = self._require_plant()
+        plant = self.plant
         target = np.asarray(command, dtype=np.float64)
         if target.shape != (3,) or not np.isfinite(target).all():
             raise SignalError("command", command, "three finite numbers [m, rad, rad]")
@@ -114,11 +116,6 @@ class Twin:
     def close(self) -> None:
         """Release the simulation; `reset` starts a new one."""
         self._plant = None
-
-    def _require_plant(self) -> Plant:
-        if self._plant is None:
-            raise SignalError("rig", "closed", "a twin after reset() and before close()")
-        return self._plant
 
     def _sample(self, plant: Plant) -> Sample:
         time, state = self.time, plant.true_state
@@ -135,13 +132,20 @@ class Twin:
         if time + self._period / 2 < self._sequence / twin.frame_rate:
             return
         strips = self._readout.strips() if readout > 0 else [plant.centreline()]
-        rendered = camera.draw_strips(strips, self._sequence)
-        truth = rendered.true_features, rendered.true_visible
         stamp = time - readout / 2 + twin.sensor.stamp_error - self._config.camera.source.delay
-        frame = Frame(rendered.image, stamp, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
-        self._in_transit.append((time + delay, frame))
+        self._draw(camera, strips, stamp, time + delay)
         self._sequence += 1
+
+    def _draw(
+        self, camera: TwinCamera, strips: list[Centreline], stamp: float, arrival: float
+    ) -> None:
+        self._send(camera.draw_strips(strips, self._sequence), self._sequence, stamp, arrival)
+
+    def _send(self, drawn: RenderedImage, sequence: int, stamp: float, arrival: float) -> None:
+        """Put a rendered image in transit."""
+        frame = Frame(drawn.image, stamp, sequence, drawn.true_features, drawn.true_visible)
+        self._in_transit.append((arrival, frame))
 
     def _newest_frame(self, time: float) -> Frame | None:
         newest = None
