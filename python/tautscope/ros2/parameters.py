@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tautscope.config import Config
+from tautscope.log.fields import stamp_of
 from tautscope.ros2 import types
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.session import Node
@@ -127,7 +128,7 @@ class Parameters:
             parameter.value = value
         event = types.make(
             "rcl_interfaces/msg/ParameterEvent",
-            stamp=types.stamp(self._clock.wall()),
+            stamp=stamp_of(self._clock.wall()),
             node=self._path,
             changed_parameters=asked,
         )
