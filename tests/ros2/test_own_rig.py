@@ -114,6 +114,36 @@ def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
         assert both.control.fault in [each.data for each in both.drain(both.warnings)]
 
 
+class Unconfirmed(Arm):
+    def close(self) -> None:
+        super().close()
+        raise StateError("bend_y", "quick stop is not confirmed", "Use the emergency stop")
+
+
+def test_a_rig_that_does_not_stop_leaves_the_first_fault_and_the_node(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm, config = Unconfirmed(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    make: Any = lambda _: arm  # noqa: E731
+
+    def broken(*_: Any) -> Sample:
+        raise StateError("bend_x", "fault 12", "See the manual")
+
+    with peers(config, tmp_path, make_rig=make) as both:
+        for call in ("reset", "step"):
+            arm.duration = 0.0
+            if call == "step":
+                both.enable(np.zeros(2))
+            with monkeypatch.context() as patch:
+                patch.setattr(arm, call, broken)
+                both.request("enable") if call == "reset" else both.tick()
+            assert both.control.operating_state == "FAULT"
+            first, _, second = both.control.fault.partition("; ")
+            assert first.startswith("bend_x: fault 12"), call
+            assert second.startswith("bend_y: quick stop is not confirmed"), call
+        arm.close = lambda: None  # type: ignore[method-assign]
+
+
 def test_the_share_of_the_compensation_in_use_is_published(tmp_path: Path) -> None:
     arm, config = Arm(), tautscope.axes(2, width_limit=1.2, unit="rad")
     arm.duration = 0.0

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,6 @@ from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
-from tautscope.hardware.plausibility import PlausibilityMonitor
-from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Rig, Sample, check_sample, disable, reset_unless
@@ -176,19 +173,9 @@ class RigControl:
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
-        is_article = isinstance(self._rig, HardwareRig)
-        monitor = partial(PlausibilityMonitor, self.config) if is_article else None
-        # Threads of the log inherit the priority.
-        with realtime(OTHERS):
-            self.run = ControlRun(
-                self.config,
-                self._rig,
-                sample,
-                self.operator,
-                path=path,
-                executor=self._executor,
-                monitor=monitor,
-            )
+        self.run = ControlRun(
+            self.config, self._rig, sample, self.operator, path=path, executor=self._executor
+        )
         self.run.set_compensation(self.compensation)
         self.record(is_recording=self.is_recording)
 
