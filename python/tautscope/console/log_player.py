@@ -88,11 +88,15 @@ class LogPlayer:
         """Publish the events from the present one on, at the pace of the recording."""
         while self._is_playing and self._next < len(self._events) and may_continue():
             index, event = self._events[self._next]
-            self._next += 1
             if isinstance(event, Tick):
                 now = event.sample.time
                 self._offset = time.monotonic() - now if self._offset is None else self._offset
-                time.sleep(max(0.0, self._offset + now - time.monotonic()))
+                left = self._offset + now - time.monotonic()
+                time.sleep(min(max(0.0, left), _IDLE_PERIOD))
+                if left > _IDLE_PERIOD:  # a gap in the recording
+                    self.publish()
+                    continue
+            self._next += 1
             self._add(index, event)
             if time.monotonic() - self._published_at >= STATE_PERIOD:
                 self.publish()
