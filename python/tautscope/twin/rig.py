@@ -25,31 +25,30 @@ class Twin:
         config: The rig's geometry and `config.twin`.
         images: Whether frames are rendered; without frames the twin is several times faster.
 
+    Attributes:
+        config: The configuration it was made from.
+        control_period: Control period [s].
+
     Wrong when inertia matters (inertias are raised for the time step, see `twin/mjcf.py`), when
     scope or tissue move, or when the instrument touches tissue.
     """
 
     def __init__(self, config: Config, *, images: bool = True) -> None:
-        self._config = config
-        self._period = config.control.period
+        self.config = config
+        self.control_period = config.control.period
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None
         self._ticks = 0
 
     def __repr__(self) -> str:
         clock = "closed" if self._plant is None else f"at {self.time:.3f} s"
-        images = f"{self._config.twin.frame_rate:g} images/s" if self.has_images else "no images"
-        return f"<Twin: seed {self._config.twin.seed}, {images}, {clock}>"
+        images = f"{self.config.twin.frame_rate:g} images/s" if self.has_images else "no images"
+        return f"<Twin: seed {self.config.twin.seed}, {images}, {clock}>"
 
     @property
     def time(self) -> float:
         """Time of its clock [s]."""
-        return self._ticks * self._period
-
-    @property
-    def config(self) -> Config:
-        """The configuration it was made from."""
-        return self._config
+        return self._ticks * self.control_period
 
     @property
     def has_images(self) -> bool:
@@ -68,11 +67,6 @@ class Twin:
         return self._plant
 
     @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return self._period
-
-    @property
     def bends(self) -> float:
         """Number of bends of the scope; may be set during a run.
 
@@ -83,18 +77,18 @@ class Twin:
 
     @bends.setter
     def bends(self, value: float) -> None:
-        self.plant.bends = self._config.replace(**{"twin.bends": value}).twin.bends
+        self.plant.bends = self.config.replace(**{"twin.bends": value}).twin.bends
 
     def reset(self) -> Sample:
         """Start with a new instrument, settled in the start posture, at time 0."""
-        seed = np.random.SeedSequence(self._config.twin.seed)
+        seed = np.random.SeedSequence(self.config.twin.seed)
         physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
-        self._plant = Plant(self._config, physics)
+        self._plant = Plant(self.config, physics)
         self._timing = timing
         self._ticks = 0
         self._sequence = 0
         self._in_transit: deque[tuple[float, Frame]] = deque()
-        self._readout = Readout(self._config.twin.sensor.readout)
+        self._readout = Readout(self.config.twin.sensor.readout)
         if self._camera is not None:
             self._camera.reset()
         return self._sample(self._plant)
@@ -124,15 +118,14 @@ class Twin:
         return Sample(time, plant.applied, self._newest_frame(time), state)
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
-        twin = self._config.twin
-        readout = twin.sensor.readout
+        twin, readout = self.config.twin, self.config.twin.sensor.readout
         if readout > 0:
             self._readout.add(time, plant.centreline())
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
-        if time + self._period / 2 < self._sequence / twin.frame_rate:
+        if time + self.control_period / 2 < self._sequence / twin.frame_rate:
             return
         strips = self._readout.strips() if readout > 0 else [plant.centreline()]
-        stamp = time - readout / 2 + twin.sensor.stamp_error - self._config.camera.source.delay
+        stamp = time - readout / 2 + twin.sensor.stamp_error - self.config.camera.source.delay
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
         self._draw(camera, strips, stamp, time + delay)
         self._sequence += 1
