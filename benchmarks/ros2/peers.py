@@ -85,7 +85,7 @@ class Barrier:
     def wait(self, *, resend: bool = False) -> None:
         """Wait until it has arrived; `resend`: send until the sessions are connected."""
         self._sent += 1
-        number = messages.number(float(self._sent))
+        number = {"data": float(self._sent)}
         begin = sent = time.monotonic()
         self._out.publish(number)
         while (found := self._in.take()) is None or found.data != self._sent:

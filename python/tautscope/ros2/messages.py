@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,6 @@ from tautscope.loop.rig import Frame
 from tautscope.ros2 import types
 from tautscope.ros2.inputs import ENCODINGS
 
-OK, WARN, ERROR = 0, 1, 2
-"""Levels of diagnostic_msgs/msg/DiagnosticStatus."""
 LOST = (Status.NO_MARKERS, Status.STALE, Status.DUPLICATE, Status.REFUSED)
 """Updates that measured nothing."""
 
@@ -30,40 +28,6 @@ def joint_state(stamp: int, joints: Sequence[str], values: Iterable[float]) -> A
 def tip_state(stamp: int, joints: Sequence[str], report: Report) -> Any:
     """sensor_msgs/msg/JointState: q_hat of an update; stamp 0 if nothing was measured (CRTK)."""
     return joint_state(0 if report.status in LOST else stamp, joints, report.state_estimate)
-
-
-def offsets(joints: Sequence[str], report: Report) -> Any:
-    """std_msgs/msg/Float64MultiArray (n, 2): delta_minus and delta_plus of each DOF."""
-    return types.make("std_msgs/msg/Float64MultiArray", **fields.offsets(joints, report))
-
-
-def text(data: str) -> Any:
-    """std_msgs/msg/String."""
-    return types.make("std_msgs/msg/String", data=data)
-
-
-def number(data: float) -> Any:
-    """std_msgs/msg/Float64."""
-    return types.make("std_msgs/msg/Float64", data=data)
-
-
-def operating_state(stamp: int, state: str, *, is_homed: bool, is_busy: bool) -> Any:
-    """crtk_msgs/msg/OperatingState."""
-    header = header_of(stamp, "")
-    kind = "crtk_msgs/msg/OperatingState"
-    return types.make(kind, header=header, state=state, is_homed=is_homed, is_busy=is_busy)
-
-
-def diagnostics(stamp: int, name: str, level: int, text: str, values: Mapping[str, object]) -> Any:
-    """diagnostic_msgs/msg/DiagnosticArray of one status."""
-    status = {"level": level, "name": name, "message": text, "hardware_id": "tautscope"}
-    found = fields.diagnostics(header_of(stamp, ""), values, **status)
-    return types.make("diagnostic_msgs/msg/DiagnosticArray", **found)
-
-
-def camera_info(stamp: int, camera: CameraConfig) -> Any:
-    """sensor_msgs/msg/CameraInfo of the configured camera."""
-    return types.make("sensor_msgs/msg/CameraInfo", **fields.camera_info(stamp, camera))
 
 
 def image(stamp: int, frame: Frame, camera: CameraConfig) -> Any | None:
