@@ -15,7 +15,6 @@ from service_client import Client
 from tautscope.errors import StateError
 from tautscope.loop.measurement import Tip
 from tautscope.loop.rig import Sample
-from tautscope.ros2 import types
 from tautscope.ros2.wire import Qos
 
 
@@ -63,10 +62,7 @@ def test_a_stop_while_a_rig_resets_is_not_forgotten(
     make: Any = lambda _: arm  # noqa: E731
     with peers(config, tmp_path, make_rig=make) as both:
         for text in ("enable", command):
-            header = types.header(0, "")
-            both.requests.publish(
-                types.make("crtk_msgs/msg/StringStamped", header=header, string=text)
-            )
+            both.requests.publish({"string": text})
         both.delivered()
         both.control.serve()
         assert both.control.run is None
