@@ -108,6 +108,7 @@ def test_a_newcomers_catheter_follows_stops_replays_and_fails(
 def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page of a log has its commands, and positions by its kinematics."""
     monkeypatch.setattr(log_player, "STATE_PERIOD", 0.0)
+    monkeypatch.setattr(log_player, "_IDLE_PERIOD", 1e9)
     monkeypatch.setattr(time, "sleep", lambda pause: None)  # at once
     memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
     shown, states = Channels(memory), []
@@ -201,6 +202,50 @@ def test_disabling_reaches_a_rig_that_can(tmp_path: Path) -> None:
         control.open()
         control.close("monitor", is_disabling=True)
         assert arm.is_disabled
+        control.shut_down()
+
+
+@pytest.mark.parametrize("is_running", [False, True])
+def test_a_log_that_cannot_be_written_leaves_the_motors_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_running: bool
+) -> None:
+    arm, config, closed = Arm(2), tautscope.axes(2, width_limit=1.0), []
+    monkeypatch.setattr(arm, "close", lambda: closed.append(True))
+    (tmp_path / "file").touch()
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
+        control = RigControl(config, rig, tmp_path, executor)
+        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+        if is_running:
+            control.open()
+        control.folder = tmp_path / "file"
+        if is_running:
+            control.restart(config)
+        else:
+            control.open()
+        assert control.run is None
+        assert closed
+        state = session_state(control, LogState(), time.monotonic())
+        assert state.motion == "off"
+        assert f"log: got '{tmp_path / 'file'}" in state.message
+        control.shut_down()
+
+
+def test_a_still_that_is_not_written_is_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    config, image = tautscope.axes(2, width_limit=1.0), np.zeros((4, 4, 3), np.uint8)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: Arm(2), 0.005, is_simulated=True)
+        control = RigControl(config, rig, tmp_path, executor)
+        control.folder = tmp_path / "missing"
+        control.lease.take(1)
+        message = Action(control.lease.number, 1, 0, "still")
+        Actions(control, lambda: image).execute(Received(1, time.monotonic(), message))
+        deadline = time.monotonic() + 20
+        while "still-1.png" not in caplog.text:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
         control.shut_down()
 
 
