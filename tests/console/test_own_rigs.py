@@ -40,7 +40,7 @@ from tautscope.errors import StateError
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
-from tautscope.loop.rig import Rig, Sample
+from tautscope.loop.rig import Rig, Sample, reset_unless
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
 
@@ -184,6 +184,24 @@ def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
                 f"{cause}. The rig's reset has not ended: use the emergency stop."
             )
         control.shut_down()
+
+
+@pytest.mark.parametrize("kind", [Interrupted, Slow])
+def test_a_reset_that_could_not_be_stopped_any_more_is_stopped(
+    monkeypatch: pytest.MonkeyPatch, kind: type[Slow]
+) -> None:
+    monkeypatch.setattr(Slow, "duration", 0.3 if kind is Slow else 20.0)
+    arm, calls = kind(2), []
+
+    def must_stop() -> bool:
+        calls.append(True)
+        raise ValueError("a record of 40000 bytes")
+
+    reason = "interrupted" if kind is Interrupted else "a record of 40000 bytes"
+    with pytest.raises(StateError, match=reason):
+        reset_unless(arm, must_stop)
+    assert arm.is_interrupted == (kind is Interrupted)
+    assert len(calls) > 1 or kind is Interrupted  # it goes on: the failure may have been one
 
 
 class Disabled(Arm):
