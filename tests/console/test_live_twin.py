@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -60,3 +61,13 @@ def test_an_image_from_before_a_reset_is_forgotten() -> None:
     again = frames(rig, 60)
     assert [frame.sequence for frame in again] == list(range(len(again)))
     assert again[0].captured_at < 0.05
+
+
+def test_a_closed_twin_can_be_reset_as_the_node_does_when_it_is_enabled_again() -> None:
+    rig = LiveTwin(small_config())
+    for _ in range(2):
+        start, deadline = rig.reset().applied, time.monotonic() + 20
+        while rig.step(start).frame is None:
+            assert time.monotonic() < deadline
+        rig.close()
+    rig.close()

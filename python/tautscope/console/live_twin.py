@@ -53,8 +53,9 @@ class LiveTwin(Twin):
         return self._uncompensated.true_state
 
     def close(self) -> None:
-        """Release the simulation and the renderer."""
+        """Release the simulation and the renderer; `reset` starts new ones."""
         self._renderer.shutdown()
+        self._renderer = realtime_executor("rendering", OTHERS)  # its thread starts with an image
         super().close()
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
