@@ -38,7 +38,7 @@ class PersistentTwin(Twin):
 
     def reset(self) -> Sample:
         """Start new at first; later, move slowly to the start position."""
-        start = np.array([self._config.experiment[dof].centre for dof in Dof])
+        start = np.array([self.config.experiment[dof].centre for dof in Dof])
         if not self._is_used:
             self._is_used, self._command = True, start
             return super().reset()

@@ -20,7 +20,6 @@ from tautscope.config import Config, dump_config, load_config
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.log.reader import read_log
 from tautscope.loop.reduction import HysteresisReduction
-from tautscope.ros2 import types
 from tautscope.ros2.session import Node
 from tautscope.twin.rig import Twin
 
@@ -113,9 +112,7 @@ class Lab:
 
     def request(self, text: str) -> None:
         """Send a state command."""
-        self._requests.publish(
-            types.make("crtk_msgs/msg/StringStamped", header=types.header(0, ""), string=text)
-        )
+        self._requests.publish({"string": text})
 
     def diagnostics(self) -> dict[str, str]:
         """The next diagnostics of the node."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.ros2 import messages, types
+from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import MakeRig, NodeControl
 from tautscope.ros2.endpoints import IMAGE, Subscription
@@ -85,7 +85,7 @@ class Barrier:
     def wait(self, *, resend: bool = False) -> None:
         """Wait until it has arrived; `resend`: send until the sessions are connected."""
         self._sent += 1
-        number = messages.number(float(self._sent))
+        number = {"data": float(self._sent)}
         begin = sent = time.monotonic()
         self._out.publish(number)
         while (found := self._in.take()) is None or found.data != self._sent:
@@ -165,9 +165,7 @@ class Peers:
 
     def request(self, text: str) -> None:
         """Send a state command, and let the node execute it."""
-        self.requests.publish(
-            types.make("crtk_msgs/msg/StringStamped", header=types.header(0, ""), string=text)
-        )
+        self.requests.publish({"string": text})
         self.delivered()
         self.control.serve()
 

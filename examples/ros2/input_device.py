@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from tautscope.ros2 import messages, types
+from tautscope.ros2 import messages
 from tautscope.ros2.endpoints import Subscription
 from tautscope.ros2.session import ROUTER, Node
 
@@ -39,10 +39,7 @@ def main(endpoint: str = ROUTER, duration: str = "10") -> None:
                 time.sleep(0.001)
 
         wait(states)  # the node is there
-        enable = types.make(
-            "crtk_msgs/msg/StringStamped", header=types.header(0, ""), string="enable"
-        )
-        requests.publish(enable)
+        requests.publish({"string": "enable"})
         wait(states, lambda state: state.state == "ENABLED")
         first = wait(setpoints)  # a stream that begins here is followed as it is
         amplitude = np.array([AMPLITUDES.get(name, OTHER) for name in first.name])

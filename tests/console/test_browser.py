@@ -23,6 +23,7 @@ from running import AGE, Arm, RunningConsole, rests, running_console
 from tautscope.config import load_config
 from tautscope.console.messages import Setting
 from tautscope.console.paced_rig import PacedRig
+from tautscope.console.uncompensated import Score
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.safety import REMEDIES, by_urgency
@@ -621,6 +622,10 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
                 wait(lambda: not moves(console))
                 moved = console.control.operator.reference - before
                 assert list(moved.nonzero()[0]) == [axis]
+        with pytest.MonkeyPatch.context() as patch:
+            # Without slack, or before it is estimated.
+            patch.setattr(Score, "errors", [(1e-3, 0.0)] * count)
+            expect(page.locator("#score")).to_contain_text("Last minute: –", timeout=TIMEOUT)
         page.set_viewport_size({"width": 400, "height": 800})
         expect(page.locator("#stop")).to_be_in_viewport()
         assert page.evaluate("document.documentElement.scrollWidth") == 400

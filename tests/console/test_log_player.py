@@ -17,6 +17,8 @@ from tautscope.console.log_player import LogPlayer
 from tautscope.console.rig_control import RigControl
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.log.reader import Tick, read_log
+from tautscope.log.writer import LogWriter
+from tautscope.loop.rig import Sample
 
 
 def test_the_player_shows_the_recorded_states_and_images(tmp_path: Path, monkeypatch) -> None:
@@ -89,6 +91,29 @@ def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
         assert seek(None, is_playing=False)["time"] == ticks[-1].sample.time
     finally:
         player.close()
+
+
+def test_the_page_is_answered_while_the_recording_has_a_gap(tmp_path: Path) -> None:
+    config = tautscope.axes(2, width_limit=1.0)
+    path = tmp_path / "run.mcap"
+    with LogWriter(path, config) as writer:
+        for time in (0.0, 0.005, 1e6):  # the disk was too slow for those in between
+            writer.tick(Sample(time, np.zeros(2)), np.zeros(2), np.zeros(2))
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
+    shown, player = Channels(memory), LogPlayer(read_log(path), Channels(memory))
+    states = []
+
+    def look() -> bool:
+        if (found := shown.state.newest()) is not None:
+            states.append(msg.decode_state(found[1]))
+            pause = msg.Received(1, 0.0, msg.Seek(None, is_playing=False))
+            shown.inbound.write(msg.encode(pause))
+        return len(states) < 5
+
+    player.run(look)
+    player.close()
+    assert states
+    assert not player._is_playing
 
 
 def test_a_time_before_a_change_shows_the_compensation_then(tmp_path: Path) -> None:

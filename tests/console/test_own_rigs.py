@@ -40,7 +40,7 @@ from tautscope.errors import StateError
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
-from tautscope.loop.rig import Rig, Sample
+from tautscope.loop.rig import Rig, Sample, reset_unless
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
 
@@ -55,6 +55,23 @@ def console_of(
     rig = PacedRig(lambda: make(config), config.control.period, is_simulated=is_twin)
     with running_console(folder, config, rig) as console:
         yield console
+
+
+@contextmanager
+def control_of(folder: Path, arm: Rig, *, is_simulated: bool = False) -> Iterator[RigControl]:
+    """Rig and loop of two axes, whose page is always present."""
+    config = tautscope.axes(2, width_limit=1.0)
+    with ThreadPoolExecutor(1) as executor:
+        rig = PacedRig(lambda: arm, 0.005, is_simulated=is_simulated)
+        control = RigControl(config, rig, folder, executor)
+        control.operator.is_present = lambda now: True  # type: ignore[method-assign]
+        yield control
+        control.shut_down()
+
+
+def session_of(control: RigControl) -> Session:
+    memory = SharedMemory(multiprocessing.get_context("spawn"), control.config)
+    return Session(control, Channels(memory))
 
 
 def test_a_newcomers_catheter_follows_stops_replays_and_fails(
@@ -108,6 +125,7 @@ def test_a_newcomers_catheter_follows_stops_replays_and_fails(
 def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page of a log has its commands, and positions by its kinematics."""
     monkeypatch.setattr(log_player, "STATE_PERIOD", 0.0)
+    monkeypatch.setattr(log_player, "_IDLE_PERIOD", 1e9)
     monkeypatch.setattr(time, "sleep", lambda pause: None)  # at once
     memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
     shown, states = Channels(memory), []
@@ -159,18 +177,15 @@ def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
 ) -> None:
     arm, states = kind(2), []
     monkeypatch.setattr(Slow, "duration", 0.5 if kind is Slow else 20.0)
-    with ThreadPoolExecutor(1) as executor:
-        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
-        control = RigControl(tautscope.axes(2, width_limit=1.0), rig, tmp_path, executor)
-        monkeypatch.setattr(control.operator, "is_present", lambda now: not states)
+    with control_of(tmp_path, arm) as control:
 
         def look() -> None:
             states.append(session_state(control, LogState(), time.monotonic()))
             if cause.startswith("STOP") and len(states) == 2:
                 control.stop(cause)
 
-        if cause.startswith("STOP"):
-            monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+        if not cause.startswith("STOP"):
+            monkeypatch.setattr(control.operator, "is_present", lambda now: not states)
         control.while_opening = look
         control.open()
         assert arm.is_interrupted == (kind is Interrupted)
@@ -182,7 +197,24 @@ def test_a_reset_that_moves_is_interrupted_or_not_shown_as_stopped(
             assert states[-1].message == (
                 f"{cause}. The rig's reset has not ended: use the emergency stop."
             )
-        control.shut_down()
+
+
+@pytest.mark.parametrize("kind", [Interrupted, Slow])
+def test_a_reset_that_could_not_be_stopped_any_more_is_stopped(
+    monkeypatch: pytest.MonkeyPatch, kind: type[Slow]
+) -> None:
+    monkeypatch.setattr(Slow, "duration", 0.3 if kind is Slow else 20.0)
+    arm, calls = kind(2), []
+
+    def must_stop() -> bool:
+        calls.append(True)
+        raise ValueError("a record of 40000 bytes")
+
+    reason = "interrupted" if kind is Interrupted else "a record of 40000 bytes"
+    with pytest.raises(StateError, match=reason):
+        reset_unless(arm, must_stop)
+    assert arm.is_interrupted == (kind is Interrupted)
+    assert len(calls) > 1 or kind is Interrupted  # it goes on: the failure may have been one
 
 
 class Disabled(Arm):
@@ -194,14 +226,46 @@ class Disabled(Arm):
 
 def test_disabling_reaches_a_rig_that_can(tmp_path: Path) -> None:
     arm = Disabled(2)
-    with ThreadPoolExecutor(1) as executor:
-        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
-        control = RigControl(tautscope.axes(2, width_limit=1.0), rig, tmp_path, executor)
-        control.operator.is_present = lambda now: True  # type: ignore[method-assign]
+    with control_of(tmp_path, arm) as control:
         control.open()
         control.close("monitor", is_disabling=True)
         assert arm.is_disabled
-        control.shut_down()
+
+
+@pytest.mark.parametrize("is_running", [False, True])
+def test_a_log_that_cannot_be_written_leaves_the_motors_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_running: bool
+) -> None:
+    arm, closed = Arm(2), []
+    monkeypatch.setattr(arm, "close", lambda: closed.append(True))
+    (tmp_path / "file").touch()
+    with control_of(tmp_path, arm) as control:
+        if is_running:
+            control.open()
+        control.folder = tmp_path / "file"
+        if is_running:
+            control.restart(control.config)
+        else:
+            control.open()
+        assert control.run is None
+        assert closed
+        state = session_state(control, LogState(), time.monotonic())
+        assert state.motion == "off"
+        assert f"log: got '{tmp_path / 'file'}" in state.message
+
+
+def test_a_still_that_is_not_written_is_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    image = np.zeros((4, 4, 3), np.uint8)
+    with control_of(tmp_path / "missing", Arm(2)) as control:
+        control.lease.take(1)
+        message = Action(control.lease.number, 1, 0, "still")
+        Actions(control, lambda: image).execute(Received(1, time.monotonic(), message))
+        deadline = time.monotonic() + 20
+        while "still-1.png" not in caplog.text:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
 
 
 class Unconfirmed(Arm):
@@ -221,16 +285,12 @@ class Unconfirmed(Arm):
 
 @pytest.mark.parametrize("where", ["close", "step"])
 def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+    tmp_path: Path, where: str
 ) -> None:
-    arm, config = Unconfirmed(2), tautscope.axes(2, width_limit=1.0)
+    arm = Unconfirmed(2)
     note = "bend_x: quick stop is not confirmed. Use the emergency stop: the motor may be moving"
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    with ThreadPoolExecutor(1) as executor:
-        rig = PacedRig(lambda: arm, 0.005, is_simulated=False)
-        control = RigControl(config, rig, tmp_path, executor)
-        session = Session(control, Channels(memory))
-        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+    with control_of(tmp_path, arm) as control:
+        session = session_of(control)
 
         def shown() -> tuple[str, str, str]:
             state = session_state(control, LogState(), time.monotonic())
@@ -255,21 +315,13 @@ def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
         control.operator.enable()
         control.open()
         assert shown()[::2] == ("ready", "enabled")
-        control.shut_down()
         session._publisher.close()
 
 
 @pytest.mark.parametrize("is_simulated", [True, False])
-def test_neither_a_hold_nor_a_warning_ends_with_its_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_simulated: bool
-) -> None:
-    config = tautscope.axes(2, width_limit=1.0)
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    with ThreadPoolExecutor(1) as executor:
-        rig = PacedRig(lambda: Arm(2), 0.005, is_simulated=is_simulated)
-        control = RigControl(config, rig, tmp_path, executor)
-        session, actions = Session(control, Channels(memory)), Actions(control, lambda: None)
-        monkeypatch.setattr(control.operator, "is_present", lambda now: True)
+def test_neither_a_hold_nor_a_warning_ends_with_its_run(tmp_path: Path, is_simulated: bool) -> None:
+    with control_of(tmp_path, Arm(2), is_simulated=is_simulated) as control:
+        session, actions = session_of(control), Actions(control, lambda: None)
 
         def shown() -> tuple[str, list[str]]:
             state = session_state(control, LogState(), time.monotonic())
@@ -299,7 +351,6 @@ def test_neither_a_hold_nor_a_warning_ends_with_its_run(
             assert shown() == ("off", ["drive_fault", "reference_jump"])
         assert execute(4, name="acknowledge").is_accepted
         assert shown()[1] == []
-        control.shut_down()
         session._publisher.close()
 
 

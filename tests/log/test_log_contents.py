@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +14,7 @@ from rosbags.rosbag2 import Reader
 from tautscope.config import CameraConfig, Config, RecordingConfig
 from tautscope.errors import RecordError
 from tautscope.log import topics
+from tautscope.log.alignment import align_recording
 from tautscope.log.export import export_csv, export_rosbag
 from tautscope.log.images import ImageCodec
 from tautscope.log.reader import Update, read_log
@@ -164,3 +166,11 @@ def test_importing_the_package_loads_no_log_and_no_camera() -> None:
         "assert not {'mcap', 'av', 'zstandard'} & sys.modules.keys()"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("count", [0, 5])
+def test_images_without_two_times_are_not_aligned(recorded: Recorded, count: int) -> None:
+    frames = recorded[1].frames[:count].copy()
+    frames["captured_at"] = 1.0  # the camera's clock stands
+    with pytest.raises(RecordError, match=f"and {min(count, 1)} images"):
+        align_recording(replace(recorded[1], frames=frames))

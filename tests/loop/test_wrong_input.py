@@ -114,6 +114,16 @@ SIGNALS: list[Case] = [
     (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda q: q[:1], jacobian=lambda q: q),
      "jacobian(q)", "(2,)", "(1, 2)"),
     (lambda: loop().on_features(np.ones(4), 0.0), "on_features", "[[dof]]", "on_tip"),
+    (lambda: HysteresisReduction(Config()).on_features(list("abcd"), 0.0),
+     "features", "'a'", "4 finite numbers"),
+    (lambda: HysteresisReduction(Config()).on_features([[0], [0, 1]], 0.0),
+     "features", "[0, 1]", "4 finite numbers"),
+    (lambda: loop().on_sample((Tip([0, 0], 0.0),)),  # type: ignore[arg-type]
+     "measurement", "tuple", "Tip, Pose or Points"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, sensor=1.0),  # type: ignore[arg-type]
+     "sensor", "1.0", "0 to 3"),
+    (lambda: loop().set_compensation("all"),  # type: ignore[arg-type]
+     "compensation", "'all'", "0 to 1"),
     (lambda: loop().predict_state(0.0), "predict_state", "[[dof]]", "on_tip"),
     (lambda: HysteresisReduction(Config()).on_tip([0.0], 0.0), "on_tip", "no [[dof]]", "axes"),
     (lambda: loop().set_compensation(1.5), "compensation", "1.5", "0 to 1"),
@@ -145,3 +155,9 @@ def test_an_error_says_where_what_and_what_may_come(case: Case) -> None:
     found, _, expected = str(caught.value).removeprefix(f"{field}: got ").partition(", expected ")
     assert value in found
     assert allowed in expected
+
+
+def test_a_time_may_be_any_number() -> None:
+    found = HysteresisReduction(planes())
+    for time in (np.int64(1), 2, np.float32(3.0), 4.0):
+        found.step([0.0, 0.0], time)

@@ -15,7 +15,6 @@ from service_client import Client
 from tautscope.errors import StateError
 from tautscope.loop.measurement import Tip
 from tautscope.loop.rig import Sample
-from tautscope.ros2 import types
 from tautscope.ros2.wire import Qos
 
 
@@ -63,10 +62,7 @@ def test_a_stop_while_a_rig_resets_is_not_forgotten(
     make: Any = lambda _: arm  # noqa: E731
     with peers(config, tmp_path, make_rig=make) as both:
         for text in ("enable", command):
-            header = types.header(0, "")
-            both.requests.publish(
-                types.make("crtk_msgs/msg/StringStamped", header=header, string=text)
-            )
+            both.requests.publish({"string": text})
         both.delivered()
         both.control.serve()
         assert both.control.run is None
@@ -112,6 +108,36 @@ def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
         both.tick()
         assert both.control.fault.endswith("; bend_x: quick stop is not confirmed")
         assert both.control.fault in [each.data for each in both.drain(both.warnings)]
+
+
+class Unconfirmed(Arm):
+    def close(self) -> None:
+        super().close()
+        raise StateError("bend_y", "quick stop is not confirmed", "Use the emergency stop")
+
+
+def test_a_rig_that_does_not_stop_leaves_the_first_fault_and_the_node(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm, config = Unconfirmed(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    make: Any = lambda _: arm  # noqa: E731
+
+    def broken(*_: Any) -> Sample:
+        raise StateError("bend_x", "fault 12", "See the manual")
+
+    with peers(config, tmp_path, make_rig=make) as both:
+        for call in ("reset", "step"):
+            arm.duration = 0.0
+            if call == "step":
+                both.enable(np.zeros(2))
+            with monkeypatch.context() as patch:
+                patch.setattr(arm, call, broken)
+                both.request("enable") if call == "reset" else both.tick()
+            assert both.control.operating_state == "FAULT"
+            first, _, second = both.control.fault.partition("; ")
+            assert first.startswith("bend_x: fault 12"), call
+            assert second.startswith("bend_y: quick stop is not confirmed"), call
+        arm.close = lambda: None  # type: ignore[method-assign]
 
 
 def test_the_share_of_the_compensation_in_use_is_published(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from ros2.peers import JOINTS, free_endpoint
 from tautscope.cli import main
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
-from tautscope.ros2 import messages, types
+from tautscope.ros2 import messages
 from tautscope.ros2.session import Node
 
 PAGE = (ROOT / "docs" / "interfaces" / "ros2.md").read_text(encoding="utf-8")
@@ -62,9 +62,7 @@ class Operator:
         self._servo = self.node.publisher("/instrument/servo_jp", JOINTS)
 
     def request(self, text: str) -> None:
-        stamp = types.header(0, "")
-        kind = "crtk_msgs/msg/StringStamped"
-        self._requests.publish(types.make(kind, header=stamp, string=text))
+        self._requests.publish({"string": text})
 
     def enable(self) -> None:
         """Also where a late tick has paused the node since it was enabled."""

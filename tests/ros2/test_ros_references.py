@@ -167,8 +167,7 @@ class Gamepad:
                 axes = np.array([0, deflection, 0, 0, 0], np.float32)
                 buttons = np.array([0, 0, 0, 0, is_holding], np.int32)
                 stamp = types.header(both.clock.wall(), "")
-                kind = "sensor_msgs/msg/Joy"
-                self._joy.publish(types.make(kind, header=stamp, axes=axes, buttons=buttons))
+                self._joy.publish({"header": stamp, "axes": axes, "buttons": buttons})
             both.delivered()
 
         commands(both)

@@ -213,7 +213,7 @@ def test_a_gamepad_moves_another_robot(tmp_path: Path) -> None:
             axes = np.array([0.5 * held, 0, 0, 0, 0], np.float32)
             buttons = np.array([0, 0, 0, 0, held], np.int32)
             header = types.header(both.clock.wall(), "")
-            joy.publish(types.make(kind, header=header, axes=axes, buttons=buttons))
+            joy.publish({"header": header, "axes": axes, "buttons": buttons})
             both.delivered()
 
         both.clock.before_tick = send

@@ -169,7 +169,7 @@ def test_twin_shares_nothing_with_what_it_tests():
     forbidden = re.compile(
         r"blocks|reduction|vision|replay|experiment|\b(Play|Compensator|Estimator|Instrument|Camera)\b"
     )
-    for file in (ROOT / "python/tautscope/twin").glob("*.py"):
+    for file in (ROOT / "python/tautscope/twin").rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 names = [node.module or "", *(alias.name for alias in node.names)]

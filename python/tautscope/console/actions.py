@@ -172,15 +172,18 @@ class Actions:
         return ""
 
     def _still(self, _: msg.Action) -> str:
-        image = self._newest_image()
+        image, control = self._newest_image(), self._control
         if image is None:
             return "there is no image"
         self._stills += 1
-        path = self._control.folder / f"still-{self._stills}.png"
-        pixels, kind = image.copy(), self._control.config.camera.pixel_format
+        path = control.folder / f"still-{self._stills}.png"
+        pixels, kind = image.copy(), control.config.camera.pixel_format
 
         def write() -> None:
-            cv2.imwrite(str(path), to_bgr(pixels, kind))
+            try:
+                path.write_bytes(cv2.imencode(".png", to_bgr(pixels, kind))[1].tobytes())
+            except OSError as error:
+                control.warn(f"the still {path} was not written ({error})")
 
         threading.Thread(target=write, name="still").start()  # takes longer than a tick
         self._text = f"the image is in {path}"

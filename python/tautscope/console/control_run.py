@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -20,11 +20,14 @@ from tautscope.console.uncompensated import (
     PlayTip,
     Score,
 )
+from tautscope.hardware.plausibility import PlausibilityMonitor
+from tautscope.hardware.realtime import OTHERS, realtime
+from tautscope.hardware.rig import HardwareRig
 from tautscope.log.writer import LogWriter
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Rig, Sample
-from tautscope.runs.control_loop import ControlLoop, Monitor
+from tautscope.runs.control_loop import ControlLoop
 
 Floats = NDArray[np.float64]
 LATE = 2.0
@@ -63,7 +66,6 @@ class ControlRun(ControlLoop):
         operator: The source of the reference.
         path: New file of the log.
         executor: Runs the marker detection.
-        monitor: As of `ControlLoop`.
 
     Attributes:
         log: Its log.
@@ -89,11 +91,13 @@ class ControlRun(ControlLoop):
         *,
         path: Path,
         executor: Executor,
-        monitor: Callable[[Floats], Monitor] | None = None,
     ) -> None:
+        is_article = isinstance(rig, HardwareRig)
+        monitor = partial(PlausibilityMonitor, config) if is_article else None
         super().__init__(config, rig, sample, executor=executor, monitor=monitor)
         self.path = path
-        self.log = LogWriter(path, config)
+        with realtime(OTHERS):  # of the log's threads, which inherit it
+            self.log = LogWriter(path, config)
         self.write_to(self.log)
         self._operator = operator
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=16)

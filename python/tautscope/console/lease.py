@@ -54,15 +54,17 @@ class Lease:
         self.holder: int | None = None
         self._sequences = {True: -1, False: -1}
 
-    def take(self, client: int) -> None:
-        """Give the lease to a connection."""
-        self._change(client)
+    def take(self, client: int | None) -> None:
+        """Give the lease to a connection, or to none."""
+        self.number += 1
+        self.holder = client
+        self._sequences = {True: -1, False: -1}
 
     def release(self, client: int) -> bool:
         """End the lease if this connection holds it; whether it did."""
         if self.holder != client:
             return False
-        self._change(None)
+        self.take(None)
         return True
 
     def refusal(self, client: int, command: Command, now: float, *, needs_image: bool) -> str:
@@ -84,8 +86,3 @@ class Lease:
             return "late, or the image displayed is old"
         self._sequences[is_servo] = command.sequence
         return ""
-
-    def _change(self, holder: int | None) -> None:
-        self.number += 1
-        self.holder = holder
-        self._sequences = {True: -1, False: -1}

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.console.paced_rig import Pace
 from tautscope.hardware.realtime import OTHERS, realtime_executor
-from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.rig import Sample
 from tautscope.twin.camera import RenderedImage, TwinCamera
 from tautscope.twin.plant import Plant
 from tautscope.twin.rig import Twin
+from tautscope.twin.sensor import Centreline
 
 
 class LiveTwin(Twin):
@@ -31,10 +32,10 @@ class LiveTwin(Twin):
         self._renderer = realtime_executor("rendering", OTHERS)
         self._rendering: tuple[Future[RenderedImage], int, float, float] | None = None
         self._pace = Pace(self.control_period)
-        self.dropped_images = 0
 
     def reset(self) -> Sample:
         """As `Twin.reset`; its clock starts."""
+        self._rendering = None  # its time is of the clock before
         sample = super().reset()
         seed = np.random.SeedSequence(self.config.twin.seed).spawn(1)[0]
         self._uncompensated = Plant(self.config, np.random.default_rng(seed))
@@ -52,32 +53,21 @@ class LiveTwin(Twin):
         return self._uncompensated.true_state
 
     def close(self) -> None:
-        """Release the simulation and the renderer."""
+        """Release the simulation and the renderer; `reset` starts new ones."""
         self._renderer.shutdown()
+        self._renderer = realtime_executor("rendering", OTHERS)  # its thread starts with an image
         super().close()
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
-        twin, readout = self.config.twin, self.config.twin.sensor.readout
-        if readout > 0:
-            self._readout.add(time, plant.centreline())
-        self._collect()
-        if time + self.control_period / 2 < self._sequence / twin.frame_rate:
-            return
-        if self._rendering is None:
-            strips = self._readout.strips() if readout > 0 else [plant.centreline()]
-            image = self._renderer.submit(camera.draw_strips, strips, self._sequence)
-            delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
-            stamp = time - readout / 2 + twin.sensor.stamp_error
-            self._rendering = image, self._sequence, stamp, time + delay
-        else:
-            self.dropped_images += 1
-        self._sequence += 1
+        if self._rendering is not None and self._rendering[0].done():
+            image, sequence, stamp, arrival = self._rendering
+            self._rendering = None
+            self._send(image.result(), sequence, stamp, arrival)
+        super()._capture(camera, plant, time)
 
-    def _collect(self) -> None:
-        """Put the image that has been rendered in transit."""
-        if self._rendering is None or not self._rendering[0].done():
-            return
-        (image, sequence, stamp, arrival), self._rendering = self._rendering, None
-        rendered = image.result()
-        truth = rendered.true_features, rendered.true_visible
-        self._in_transit.append((arrival, Frame(rendered.image, stamp, sequence, *truth)))
+    def _draw(
+        self, camera: TwinCamera, strips: list[Centreline], stamp: float, arrival: float
+    ) -> None:
+        if self._rendering is None:
+            image = self._renderer.submit(camera.draw_strips, strips, self._sequence)
+            self._rendering = image, self._sequence, stamp, arrival

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from bisect import bisect_left
 from collections.abc import Callable
 from os import PathLike
+from typing import Any
 
 import numpy as np
 
@@ -88,11 +90,15 @@ class LogPlayer:
         """Publish the events from the present one on, at the pace of the recording."""
         while self._is_playing and self._next < len(self._events) and may_continue():
             index, event = self._events[self._next]
-            self._next += 1
             if isinstance(event, Tick):
                 now = event.sample.time
                 self._offset = time.monotonic() - now if self._offset is None else self._offset
-                time.sleep(max(0.0, self._offset + now - time.monotonic()))
+                left = self._offset + now - time.monotonic()
+                time.sleep(min(max(0.0, left), _IDLE_PERIOD))
+                if left > _IDLE_PERIOD:  # a gap in the recording
+                    self.publish()
+                    continue
+            self._next += 1
             self._add(index, event)
             if time.monotonic() - self._published_at >= STATE_PERIOD:
                 self.publish()
@@ -169,7 +175,7 @@ class LogPlayer:
             show_truth(state, tick.sample.true_state, self._kinematics)
 
     def _add_update(self, index: int, update: LoggedUpdate) -> None:
-        row = dict(zip(self._log.update_names, update.row, strict=True))
+        row: dict[str, Any] = dict(zip(self._log.update_names, update.row, strict=True))
         state, dofs = self._state, self._log.config.dofs
         estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
         predicted = np.array([row[f"predicted_{dof.label}"] for dof in dofs], np.float64)
@@ -180,17 +186,15 @@ class LogPlayer:
         state.tip = known(tip)
         state.delta_minus, state.delta_plus = values(update.delta_minus), values(update.delta_plus)
         self._images += 1
-        captured_at, arrived_at = float(row["captured_at"]), float(row["arrived_at"])  # type: ignore[arg-type]
-        age, status = arrived_at - captured_at, str(row["status"])
-        state.image = ImageState(self._images, status, age, updates=self._images)
+        age = row["arrived_at"] - row["captured_at"]
+        state.image = ImageState(self._images, row["status"], age, updates=self._images)
         state.image.deviation = (None,) * len(dofs)
         if self._log.has_image(index):
-            frame = Frame(self._log.image(index), captured_at, int(row["sequence"]))  # type: ignore[call-overload]
-            found = tuple(np.isfinite(row[f"features_{band}_x"]) for band in "ab")  # type: ignore[call-overload]
+            frame = Frame(self._log.image(index), row["captured_at"], row["sequence"])
+            a, b = (math.isfinite(row[f"features_{band}_x"]) for band in "ab")
             reference = np.array(state.reference)
             without = np.array(state.uncompensated, np.float64)
-            is_found = bool(found[0]), bool(found[1])
-            bands = Bands(estimate, predicted, reference, without, is_found)
+            bands = Bands(estimate, predicted, reference, without, (a, b))
             self._publisher.submit(Update(self._images, frame, time.monotonic(), bands))
 
     def _add_request(self, request: Request) -> None:

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,6 @@ from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
-from tautscope.hardware.plausibility import PlausibilityMonitor
-from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Rig, Sample, check_sample, disable, reset_unless
@@ -73,7 +70,7 @@ class RigControl:
         self.kinematics = build_kinematics(config) if config.dof else None
         self._rig, self._executor = rig, executor
         if isinstance(rig, HardwareRig):
-            rig.warn = self._warn
+            rig.warn = self.warn
         self._runs = 0
         self._endings: list[threading.Thread] = []
 
@@ -146,6 +143,12 @@ class RigControl:
         if self.run is not None:
             self.run.note(text)
 
+    def warn(self, text: str) -> None:
+        """Warn, also in the log if there is one; for any thread."""
+        _LOG.warning("%s", text)
+        if (run := self.run) is not None:
+            run.log.warn(text)
+
     def record(self, *, is_recording: bool) -> None:
         """Keep images as they are (PNG), or as JPEG, which takes a fifth of the space."""
         self.is_recording = is_recording
@@ -176,26 +179,16 @@ class RigControl:
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
-        is_article = isinstance(self._rig, HardwareRig)
-        monitor = partial(PlausibilityMonitor, self.config) if is_article else None
-        # Threads of the log inherit the priority.
-        with realtime(OTHERS):
+        try:
             self.run = ControlRun(
-                self.config,
-                self._rig,
-                sample,
-                self.operator,
-                path=path,
-                executor=self._executor,
-                monitor=monitor,
+                self.config, self._rig, sample, self.operator, path=path, executor=self._executor
             )
+        except TautscopeError as error:
+            self.run = None
+            self._stop_motors(described(error))
+            return
         self.run.set_compensation(self.compensation)
         self.record(is_recording=self.is_recording)
-
-    def _warn(self, text: str) -> None:
-        _LOG.warning("%s", text)
-        if self.run is not None:
-            self.run.log.warn(text)
 
     def _end(self, run: ControlRun) -> None:
         """Keep the warnings, and close the log in the background, because the disk may be slow."""

@@ -82,17 +82,17 @@ def align_recording(recording: Recording, limit: float = LIMIT) -> DelayEstimate
     the delay. The bands are those that were found in the run.
 
     Raises:
-        RecordError: The run has fewer than two ticks or images, or another sensor.
+        RecordError: The run has fewer than two ticks or images, each later than the one before, or
+            another sensor.
     """
     if recording.config.dof:
         allowed = "images; of another sensor `tautscope calibrate latency --rig` finds the delay"
         raise RecordError("log", "no images", allowed)
     trace, frames = recording.trace, recording.frames
+    frames = frames[np.diff(frames["captured_at"], prepend=-np.inf) > 0]
     if min(len(trace), len(frames)) < 2:
         found = f"{len(trace)} ticks and {len(frames)} images"
         raise RecordError("recording", found, "at least 2 of each")
-    later = np.concatenate([[True], np.diff(frames["captured_at"]) > 0])
-    frames = frames[later]
     tips = tip_states(per_feature(frames, "features"), recording.config)
     commands = per_dof(trace, "command")
     return estimate_delay(trace["time"], commands, frames["captured_at"], tips, limit)

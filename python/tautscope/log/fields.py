@@ -1,13 +1,15 @@
-"""Message fields that several topics share, in their ROS 2 types."""
+"""Fields of messages that logs and the ROS 2 node have, in their ROS 2 types."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from tautscope.config import CameraConfig
 from tautscope.log.cdr import Message
+from tautscope.loop.reduction import Report
 
 
 def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
@@ -20,7 +22,7 @@ def stamp_of(nanoseconds: int) -> dict[str, int]:
     return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
 
 
-def joint_state(header: Message, names: list[str], values: Iterable[float]) -> dict[str, Any]:
+def joint_state(header: Message, names: Sequence[str], values: Iterable[float]) -> dict[str, Any]:
     """sensor_msgs/msg/JointState: positions (n,) [m or rad] of the degrees of freedom."""
     position = [float(value) for value in values]
     return {"header": header, "name": names, "position": position}
@@ -34,3 +36,30 @@ def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:
         for place, (label, size) in enumerate(axes.items())
     ]
     return {"layout": {"dim": dim}, "data": [float(value) for value in data]}
+
+
+def offsets(names: Sequence[str], report: Report) -> dict[str, Any]:
+    """std_msgs/msg/Float64MultiArray (n, 2): delta_minus and delta_plus of each DOF."""
+    values = np.stack([report.delta_minus, report.delta_plus], axis=1).ravel()
+    return multi_array({",".join(names): len(names), "minus,plus": 2}, values)
+
+
+def diagnostics(header: Message, values: Mapping[str, object], **status: Any) -> dict[str, Any]:
+    """diagnostic_msgs/msg/DiagnosticArray of one status, from its values and other fields."""
+    status["values"] = [{"key": key, "value": str(value)} for key, value in values.items()]
+    return {"header": header, "status": [status]}
+
+
+def camera_info(stamp: int, camera: CameraConfig) -> dict[str, Any]:
+    """sensor_msgs/msg/CameraInfo of the configured camera."""
+    fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+    return {
+        "header": header_of(stamp, "endoscope"),
+        "height": camera.height,
+        "width": camera.width,
+        "distortion_model": "rational_polynomial",
+        "d": camera.distortion,
+        "k": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        "r": np.eye(3).ravel(),
+        "p": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }

@@ -8,15 +8,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
 
 import tomlkit
 
 from tautscope._core import __version__
-from tautscope.config import CameraConfig, Config, dump_config, from_document
+from tautscope.config import Config, dump_config, from_document
 from tautscope.errors import ConfigError, RecordError
 from tautscope.log import topics
-from tautscope.log.fields import header_of
+from tautscope.log.fields import camera_info
 from tautscope.loop.references import Segment
 from tautscope.runs.recording import read_run_facts, run_facts
 
@@ -39,7 +38,7 @@ def header_messages(info: RunInfo, stamp: int) -> dict[str, bytes]:
         topics.VERSIONS: {"data": json.dumps(software_versions())},
     }
     if not config.dof:
-        messages[topics.CAMERA_INFO] = _camera_info(config.camera, stamp)
+        messages[topics.CAMERA_INFO] = camera_info(stamp, config.camera)
     return topics.encode_all(messages)
 
 
@@ -74,18 +73,3 @@ def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]
         allowed = f"a log of tautscope, with {topics.CONFIG}, {topics.RUN} and {topics.VERSIONS}"
         raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None
     return RunInfo(config, compensated, segments), versions
-
-
-def _camera_info(camera: CameraConfig, stamp: int) -> dict[str, Any]:
-    """sensor_msgs/msg/CameraInfo."""
-    intrinsics = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
-    return {
-        "header": header_of(stamp, "endoscope"),
-        "height": camera.height,
-        "width": camera.width,
-        "distortion_model": "rational_polynomial",
-        "d": camera.distortion,
-        "k": intrinsics,
-        "r": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-        "p": (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, *[0.0] * 3, 1.0, 0.0),
-    }

@@ -13,7 +13,14 @@ from tautscope.log import topics
 from tautscope.log.cdr import Message
 from tautscope.log.fields import multi_array
 from tautscope.loop.kinematics import Floats
-from tautscope.loop.measurement import Measurement, Points, Pose, Tip, check_rotation
+from tautscope.loop.measurement import (
+    Measurement,
+    Points,
+    Pose,
+    Tip,
+    check_rotation,
+    raw_values,
+)
 
 _TIMES = ("captured_at", "sensor")
 _QUATERNION = ("q_x", "q_y", "q_z", "q_w")
@@ -37,9 +44,10 @@ def measurement_messages(
         messages[topics.COVARIANCE] = multi_array(sides, covariance.ravel())
     if isinstance(measurement, Pose):
         messages[topics.POSE] = {"header": header, "pose": _pose(measurement)}
-    kind, values = _kind_and_values(measurement)
-    names = (*_TIMES, *_names(measurement, dofs))
-    numbers = (measurement.captured_at, measurement.sensor, *values)
+    kind, names = type(measurement).__name__.lower(), (*_TIMES, *_names(measurement, dofs))
+    numbers = [measurement.captured_at, measurement.sensor, *raw_values(measurement).ravel()]
+    if isinstance(measurement, Pose) and measurement.orientation is not None:
+        numbers.extend(np.ravel(np.asarray(measurement.orientation, dtype=np.float64)))
     messages[topics.MEASUREMENT] = multi_array({kind: 1, ",".join(names): len(names)}, numbers)
     return messages
 
@@ -73,17 +81,6 @@ def value_names(measurement: Measurement, dofs: Sequence[str]) -> list[str]:
     if isinstance(measurement, Pose) and measurement.orientation is not None:
         return [*names[:3], "rotation_x", "rotation_y", "rotation_z"]
     return list(names)
-
-
-def _kind_and_values(measurement: Measurement) -> tuple[str, Floats]:
-    if isinstance(measurement, Tip):
-        return "tip", np.asarray(measurement.values, dtype=np.float64)
-    if isinstance(measurement, Points):
-        return "points", np.ravel(np.asarray(measurement.pixels, dtype=np.float64))
-    parts = [np.asarray(measurement.position, dtype=np.float64)]
-    if measurement.orientation is not None:
-        parts.append(np.ravel(np.asarray(measurement.orientation, dtype=np.float64)))
-    return "pose", np.concatenate(parts)
 
 
 def _made(

@@ -16,7 +16,14 @@ from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import topics
 from tautscope.log.cdr import Message
-from tautscope.log.fields import header_of, joint_state, multi_array, stamp_of
+from tautscope.log.fields import (
+    diagnostics,
+    header_of,
+    joint_state,
+    multi_array,
+    offsets,
+    stamp_of,
+)
 from tautscope.log.measurements import measurement_messages, read_measurement, value_names
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
@@ -120,7 +127,6 @@ class Codec:
         stamp = clock.nanoseconds(report.captured_at)
         row = dict(zip(self._columns, update_row(now, seen, report, count), strict=True))
         numbers = {name: float(row[name]) for name in self._numbers}  # type: ignore[arg-type]
-        deltas = np.stack([report.delta_minus, report.delta_plus], axis=1).ravel()
         if isinstance(seen, Frame):
             source, name, own = "endoscope", "images", {}
             features = [row[f"features_{name}"] for name in FEATURES]
@@ -135,12 +141,11 @@ class Codec:
                 names = value_names(seen, self._names)
                 numbers |= zip((f"{group}_{each}" for each in names), values, strict=True)
         header = header_of(stamp, source)
-        delta_axes = {",".join(self._names): len(self._names), "minus,plus": 2}
         return topics.encode_all(
             {
                 **own,
                 topics.ESTIMATE: joint_state(header, self._names, report.state_estimate),
-                topics.DELTA: multi_array(delta_axes, deltas),
+                topics.DELTA: offsets(self._names, report),
                 **markers,
                 topics.STATUS: self._status(header, name, report),
                 topics.UPDATE: multi_array({",".join(numbers): len(numbers)}, numbers.values()),
@@ -194,20 +199,17 @@ class Codec:
             for label, triggers in zip(self._names, report.triggers, strict=True)
         }
         values |= {"reaction": str(report.reaction), "warnings": ",".join(report.warnings)}
-        if report.detection is not None:
-            values |= {
-                "reason_a": report.detection.reasons[0],
-                "reason_b": report.detection.reasons[1],
-                "discriminant": str(report.detection.discriminant),
-            }
-        status = {
-            "level": 0 if report.status is Status.OK else 1,
-            "name": name,
-            "message": str(report.status),
-            "hardware_id": header["frame_id"],
-            "values": [{"key": key, "value": value} for key, value in values.items()],
-        }
-        return {"header": header, "status": [status]}
+        if (detection := report.detection) is not None:
+            values |= zip(("reason_a", "reason_b"), detection.reasons, strict=True)
+            values["discriminant"] = str(detection.discriminant)
+        return diagnostics(
+            header,
+            values,
+            level=0 if report.status is Status.OK else 1,
+            name=name,
+            message=str(report.status),
+            hardware_id=header["frame_id"],
+        )
 
 
 def image_message(clock: Clock, captured_at: float, image_format: str, data: bytes) -> bytes:

@@ -52,10 +52,9 @@ class Update:
     def status(self) -> dict[str, Any]:
         """Level, name and message of its status, and further texts by key under ``values``."""
         (status,) = topics.decode(topics.STATUS, self.raw[topics.STATUS]).status
-        texts = {each.key: each.value for each in status.values}
-        return {"level": status.level, "name": status.name, "message": status.message} | {
-            "values": texts
-        }
+        values = {each.key: each.value for each in status.values}
+        level, name, message = status.level, status.name, status.message
+        return {"level": level, "name": name, "message": message, "values": values}
 
 
 @dataclass(frozen=True, slots=True)

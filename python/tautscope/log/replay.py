@@ -137,17 +137,14 @@ def _send_request(loop: HysteresisReduction, request: str) -> None:
     elif call == "raise_flag" and name in DETECTORS:
         loop.raise_flag(name)
     elif call == "set_compensation":
-        loop.set_compensation(_share(request, name))
+        try:
+            loop.set_compensation(float(name))
+        except ValueError:
+            allowed = "set_compensation and a share from 0 to 1"
+            raise RecordError("log", request, allowed) from None
     elif call != "note":
         allowed = "engage, acknowledge, raise_flag, set_compensation, prepare_detection, or a note"
         raise RecordError("log", request, allowed)
-
-
-def _share(request: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise RecordError("log", request, "set_compensation and a share from 0 to 1") from None
 
 
 def _is_same(

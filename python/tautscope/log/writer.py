@@ -144,7 +144,6 @@ class LogWriter:
 
         `made_at` is the rig time of the reference [s], if the loop got it.
         """
-        self._start_clock(sample.time)
         self._ticks += 1
         # Copies, because the caller may reuse its arrays before they are written.
         truth = None if sample.true_state is None else np.array(sample.true_state)
@@ -159,7 +158,6 @@ class LogWriter:
             frame: The frame; its image is copied.
             report: Result of the update.
         """
-        self._start_clock(now)
         self._updates += 1
         frame_info = Frame(
             np.empty(0, np.uint8), frame.captured_at, frame.sequence, frame.true_features
@@ -181,7 +179,6 @@ class LogWriter:
             measurement: The measurement; it is copied.
             report: Result of the update.
         """
-        self._start_clock(now)
         self._updates += 1
         self._enqueue(now, (now, deepcopy(measurement), report, self._updates))
 
@@ -190,7 +187,6 @@ class LogWriter:
 
         In your own loop: ``loop.on_event = lambda request: log.event(sample.time, request)``.
         """
-        self._start_clock(now)
         self._enqueue(now, (request,))
 
     def warn(self, text: str) -> None:
@@ -234,12 +230,10 @@ class LogWriter:
             self.warn(f"the run ended with {type(error).__name__}: {error}")
         self.close()
 
-    def _start_clock(self, now: float) -> None:
-        if self._journal.clock is None:
-            self._journal.clock = msg.Clock(now, time.time_ns())
-
     def _enqueue(self, now: float, arguments: tuple[Any, ...]) -> bool:
         journal = self._journal
+        if journal.clock is None:
+            journal.clock = msg.Clock(now, time.time_ns())
         self._index += 1
         if not self._has_room(journal.events, self._settings.queue_events):
             journal.dropped += 1

@@ -150,15 +150,11 @@ class ActuatedRig:
     """
 
     def __init__(self, rig: Rig, config: Config) -> None:
-        self._rig, self.actuators = rig, Actuators(config)
+        self._rig, self.control_period = rig, rig.control_period
+        self.actuators = Actuators(config)
         self._sent: Floats | None = None
         self._count = len(config.dof)
         self._is_limited = False
-
-    @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return self._rig.control_period
 
     def reset(self) -> Sample:
         """Reset the rig."""

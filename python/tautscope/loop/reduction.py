@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope._core import MOST_SENSORS
 from tautscope.config import Config
 from tautscope.dof import display_text
-from tautscope.errors import SignalError
+from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.construction import build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
@@ -370,7 +370,10 @@ class HysteresisReduction:
 
     def on_sample(self, measurement: Measurement) -> Report:
         """Update with a measurement of a rig: `on_tip`, `on_pose` or `on_points`."""
-        call = f"on_{type(measurement).__name__.lower()}"
+        kind = type(measurement).__name__
+        if not isinstance(measurement, Measurement):
+            raise SignalError("measurement", kind, "a Tip, Pose or Points")
+        call = f"on_{kind.lower()}"
         reading = self._axes_sensors(call).reading(measurement)
         return self._update_by(reading, measurement.captured_at, measurement.sensor)
 
@@ -404,8 +407,12 @@ class HysteresisReduction:
         Raises:
             ConfigError: The share is not from 0 to 1; the loop is unchanged.
         """
-        self._loop.set_compensation(float(share))
-        self._notify(f"set_compensation {float(share)!r}")
+        try:
+            value = float(share)
+        except (TypeError, ValueError):
+            raise ConfigError("compensation", share, "a share from 0 to 1") from None
+        self._loop.set_compensation(value)
+        self._notify(f"set_compensation {value!r}")
 
     def raise_flag(self, name: str) -> None:
         """Raise a flag that only the rig can detect: ``drive_fault``, ``following_error``.
@@ -478,7 +485,7 @@ class HysteresisReduction:
 
     def _update_by(self, reading: Reading, captured_at: float, sensor: int) -> Report:
         captured_at = check_time("captured_at", captured_at)
-        if sensor not in range(MOST_SENSORS):
+        if not isinstance(sensor, int | np.integer) or sensor not in range(MOST_SENSORS):
             raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0

@@ -20,6 +20,7 @@ from tautscope.loop.signal_checks import check_time
 
 _WATCH_PERIOD = 0.005
 """Time between two calls of `must_stop` [s]."""
+_STOPPED = "stopped while it was being enabled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,18 +103,25 @@ class Rig(Protocol):
 def reset_unless(rig: Rig, must_stop: Callable[[], bool]) -> Sample:
     """`rig.reset`, which may move motors for seconds, to be stopped once `must_stop` is true.
 
-    It is called periodically in another thread. A rig with a method `interrupt`, as `MotorRig`, is
-    quick-stopped at once; any other one is to be closed when its `reset` has ended.
+    It is called periodically in another thread; an error of it is a stop, because nothing else
+    could stop the motors then. A rig with a method `interrupt`, as `MotorRig`, is quick-stopped at
+    once; any other one is to be closed when its `reset` has ended.
 
     Raises:
         StateError: It was stopped; also other errors of `reset` may then be raised.
     """
     is_over, is_stopping = threading.Event(), threading.Event()
     interrupt: Callable[[], None] = getattr(rig, "interrupt", lambda: None)
+    what = _STOPPED
 
     def watch() -> None:
+        nonlocal what
         while not is_over.wait(_WATCH_PERIOD):
-            if must_stop():
+            try:
+                if must_stop():
+                    is_stopping.set()
+            except Exception as error:
+                what = f"{_STOPPED} ({type(error).__name__}: {error})"
                 is_stopping.set()
             if is_stopping.is_set():
                 interrupt()  # again and again: before the motors are open it has no effect
@@ -126,7 +134,7 @@ def reset_unless(rig: Rig, must_stop: Callable[[], bool]) -> Sample:
         is_over.set()
         thread.join()
     if is_stopping.is_set():
-        raise StateError("rig", "stopped while it was being enabled", "Enable it again")
+        raise StateError("rig", what, "Enable it again")
     return sample
 
 

@@ -17,10 +17,10 @@ def check_features(values: ArrayLike) -> NDArray[np.float64]:
     Raises:
         SignalError: They are anything else.
     """
-    features = np.asarray(values, dtype=np.float64) if np.shape(values) == (4,) else np.empty(0)
-    lost = np.isnan(features).reshape(-1, 2).all(axis=1).repeat(2)
-    if features.shape != (4,) or lost.all():
+    features = _numbers("features", values, "4 finite numbers")
+    if features.shape != (4,) or np.isnan(features).all():
         return check_signal("features", values, (4,))
+    lost = np.isnan(features).reshape(2, 2).all(axis=1).repeat(2)
     check_signal("features", np.where(lost, 0.0, features), (4,))
     return features
 
@@ -45,7 +45,7 @@ def check_time(field: str, value: float) -> float:
     Raises:
         SignalError: It is not a finite number.
     """
-    if not isinstance(value, float | int | np.floating) or not math.isfinite(value):
+    if not isinstance(value, float | int | np.floating | np.integer) or not math.isfinite(value):
         raise SignalError(field, value, "a finite number of seconds")
     return float(value)
 

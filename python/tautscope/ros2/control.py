@@ -7,7 +7,6 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,6 @@ import numpy as np
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import ConfigError, MessageError, TautscopeError, described
-from tautscope.hardware.plausibility import PlausibilityMonitor
-from tautscope.hardware.realtime import OTHERS, realtime
-from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
 from tautscope.loop.rig import Frame, Rig, disable, reset_unless
@@ -201,13 +197,18 @@ class NodeControl:
                 if transition.goal in (State.UNCONFIGURED, State.FINALIZED):
                     self._release_rig()
         except TautscopeError as error:
-            self.fault, self._states.goal = described(error), OperatingState.FAULT
-            _LOG.warning("%s", self.fault)
-            self._telemetry.warn(self.fault)
+            is_start = transition in (CONFIGURE, ACTIVATE)
+            faults = [described(error)]
+            if not is_start and self.fault:
+                faults.insert(0, self.fault)  # for which the rig was to stop
             if transition is ACTIVATE and self._rig is not None:
-                self._rig.close()
+                try:
+                    self._rig.close()
+                except TautscopeError as unconfirmed:
+                    faults.append(described(unconfirmed))
+            self._set_fault("; ".join(faults))
             # A rig that cannot be stopped orderly is left in any case.
-            return transition not in (CONFIGURE, ACTIVATE)
+            return not is_start
         return True
 
     def _is_stopped(self) -> bool:
@@ -226,23 +227,14 @@ class NodeControl:
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
         sample = reset_unless(rig, self._is_stopped)
-        is_article = isinstance(rig, HardwareRig)
-        monitor = partial(PlausibilityMonitor, self._config) if is_article else None
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
         self._achieved = Achieved(self._config)
-        # Threads of the log inherit the priority.
-        with realtime(OTHERS):
-            run = ControlRun(
-                self._config,
-                rig,
-                sample,
-                self._source,
-                path=self._folder / f"ros2-{self._runs}.mcap",
-                executor=self._executor,
-                monitor=monitor,
-            )
+        path = self._folder / f"ros2-{self._runs}.mcap"
+        run = ControlRun(
+            self._config, rig, sample, self._source, path=path, executor=self._executor
+        )
         if not self._config.dof:
             # The detector is made and used now, because its first use is slow.
             blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
@@ -287,12 +279,15 @@ class NodeControl:
 
     def _fail(self, fault: str) -> None:
         """End the run because of a fault."""
-        _LOG.warning("%s", fault)
-        self.fault, self._states.goal = fault, OperatingState.FAULT
         if self.run is not None:
             self.run.note(f"rig off: {fault}")
-        self._telemetry.warn(fault)
+        self._set_fault(fault)
         self.lifecycle.trigger(DEACTIVATE)
+
+    def _set_fault(self, fault: str) -> None:
+        _LOG.warning("%s", fault)
+        self.fault, self._states.goal = fault, OperatingState.FAULT
+        self._telemetry.warn(fault)
 
     def _publish_state(self) -> None:
         self._telemetry.state(self.operating_state, is_homed=self.run is not None)

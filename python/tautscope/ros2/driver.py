@@ -37,6 +37,9 @@ class DriverRig:
         node: Publishes and subscribes.
         clock: The clocks.
         refuse: Called for refused messages.
+
+    Attributes:
+        control_period: Time from one command to the next [s].
     """
 
     def __init__(self, config: Config, node: Node, clock: Clock, refuse: Refuse) -> None:
@@ -52,13 +55,9 @@ class DriverRig:
         self._joints = [dof.label for dof in config.dofs]
         self._clock, self._refuse = clock, refuse
         self._period = round(config.control.period * 1e9)
+        self.control_period = self._period / 1e9
         self._applied: NDArray[np.float64] | None = None
         self._start = self._due = self._moved_at = self._frames = 0
-
-    @property
-    def control_period(self) -> float:
-        """Time from one command to the next [s]."""
-        return self._period / 1e9
 
     def reset(self) -> Sample:
         """Wait for the driver's positions; the clock is at 0.

@@ -7,7 +7,7 @@ A control loop that takes them is never interrupted by one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from tautscope.errors import MessageError
@@ -25,12 +25,18 @@ LARGEST_IMAGE = 2**26
 class Publisher:
     """Publishes messages of one topic; made by `Node.publisher`."""
 
-    def __init__(self, publisher: Any, token: Any, source: bytes) -> None:
-        self._publisher, self._token, self._source = publisher, token, source
+    def __init__(self, kind: str, publisher: Any, token: Any, source: bytes) -> None:
+        self._kind, self._publisher = kind, publisher
+        self._token, self._source = token, source
         self._sequence = 0
 
     def publish(self, message: Any) -> None:
-        """Send a message; what the transport cannot take in 1 ms, images in 50 ms, is dropped."""
+        """Send a message, or one of these fields.
+
+        What the transport cannot take in 1 ms, images in 50 ms, is dropped.
+        """
+        if isinstance(message, Mapping):
+            message = types.make(self._kind, **message)
         self.send(types.encode(message))
 
     def send(self, payload: bytes) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from tautscope.ros2 import types
 from tautscope.ros2.session import Node
 
 
@@ -83,8 +82,7 @@ class Lifecycle:
         if self.state is not transition.start or not self._change(transition):
             return False
         self.state = transition.goal
-        event = types.make("lifecycle_msgs/msg/TransitionEvent", **_description(transition))
-        self._events.publish(event)
+        self._events.publish(_description(transition))
         return True
 
     def _change_state(self, request: Any) -> dict[str, Any]:

@@ -54,16 +54,15 @@ class MeasurementReader:
             allowed = f"{self._frame!r}, in which the kinematics gives the tip"
             raise MessageError(f"{topic} header.frame_id", frame[:64], allowed)
         if self._settings.type == "PointStamped":
-            return self._pose("point", message.point, None, captured_at)
+            return self._pose("point", message.point, None, captured_at, None)
         covariance = None
         pose, field = message.pose, "pose"
         if self._settings.type == "PoseWithCovarianceStamped":
-            covariance = np.reshape(np.asarray(pose.covariance, np.float64), (6, 6))
+            known = np.reshape(np.asarray(pose.covariance, np.float64), (6, 6))
+            covariance = known if known.any() else None  # all zeros mark an unknown one
             pose, field = pose.pose, "pose.pose"
         turned = self._rotation(f"{field}.orientation", pose.orientation)
-        read = partial(self._pose, f"{field}.position", pose.position, turned, captured_at)
-        # All zeros mark an unknown covariance.
-        return read() if covariance is None or not covariance.any() else read(covariance)
+        return self._pose(f"{field}.position", pose.position, turned, captured_at, covariance)
 
     def _rotation(self, field: str, quaternion: Any) -> Floats | None:
         """Rotation matrix (3, 3) of a quaternion; None where it is all NaN."""
@@ -78,7 +77,7 @@ class MeasurementReader:
         point: Any,
         rotation: Floats | None,
         captured_at: float,
-        covariance: Floats | None = None,
+        covariance: Floats | None,
     ) -> Pose | None:
         position = np.array([point.x, point.y, point.z], np.float64)
         if np.isinf(position).any():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tautscope.config import Config
-from tautscope.ros2 import types
+from tautscope.log.fields import stamp_of
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.session import Node
 
@@ -125,12 +125,8 @@ class Parameters:
             assert parameter.set is not None
             parameter.set(value)
             parameter.value = value
-        event = types.make(
-            "rcl_interfaces/msg/ParameterEvent",
-            stamp=types.stamp(self._clock.wall()),
-            node=self._path,
-            changed_parameters=asked,
-        )
+        stamp = stamp_of(self._clock.wall())
+        event = {"stamp": stamp, "node": self._path, "changed_parameters": asked}
         self._events.publish(event)
 
     def _value(self, name: str) -> dict[str, Any]:

@@ -109,7 +109,7 @@ class Node:
             congestion_control=self._congestion,
             express=True,
         )
-        return Publisher(publisher, token, wire.gid(name))
+        return Publisher(kind, publisher, token, wire.gid(name))
 
     def subscription(self, topic: str, kind: str, qos: Qos = NEWEST) -> Subscription:
         """A subscription that keeps the newest `qos.depth` messages."""

@@ -9,6 +9,8 @@ from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import MessageError
 from tautscope.hardware.realtime import OTHERS, realtime_executor
+from tautscope.log import fields
+from tautscope.log.fields import header_of
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
@@ -17,6 +19,8 @@ from tautscope.ros2.clock import Clock
 from tautscope.ros2.endpoints import IMAGE, Publisher
 from tautscope.ros2.session import SENSOR_DATA, Node
 
+OK, WARN, ERROR = 0, 1, 2
+"""Levels of diagnostic_msgs/msg/DiagnosticStatus."""
 STATE_PERIOD = 100_000_000
 """Time between two operating states [ns]; a change is published at once."""
 DIAGNOSTICS_PERIOD = 1_000_000_000
@@ -91,13 +95,13 @@ class Telemetry:
         age = round((run.sample.time - report.captured_at) * 1e9)
         captured = self._clock.wall() - age
         self._tip.publish(messages.tip_state(captured, self._joints, report))
-        self._offsets.publish(messages.offsets(self._joints, report))
+        self._offsets.publish(fields.offsets(self._joints, report))
         supervision = run.loop.supervision
-        self._mode.publish(messages.text(str(supervision.reaction)))
-        self._compensation.publish(messages.number(run.compensation * supervision.lead))
+        self._mode.publish({"data": str(supervision.reaction)})
+        self._compensation.publish({"data": run.compensation * supervision.lead})
         if not isinstance(source, Frame):
             return
-        self._camera_info.publish(messages.camera_info(captured, self._config.camera))
+        self._camera_info.publish(fields.camera_info(captured, self._config.camera))
         if self._has_rig and self._sending.done() and self._image.has_subscribers:
             self._sending = self._images.submit(self._send_image, captured, source)
 
@@ -116,10 +120,9 @@ class Telemetry:
         if shown == self._shown and now - self._shown_at < STATE_PERIOD:
             return
         self._shown, self._shown_at = shown, now
-        wall = self._clock.wall()
-        self._state.publish(
-            messages.operating_state(wall, state, is_homed=is_homed, is_busy=is_busy)
-        )
+        header = header_of(self._clock.wall(), "")
+        found = {"header": header, "state": state, "is_homed": is_homed, "is_busy": is_busy}
+        self._state.publish(found)
 
     def refuse(self, error: MessageError) -> None:
         """Count a refused message, and warn at most once per second and field."""
@@ -131,11 +134,11 @@ class Telemetry:
 
     def result(self, text: str) -> None:
         """Publish what the compensation achieved."""
-        self._result.publish(messages.text(text))
+        self._result.publish({"data": text})
 
     def warn(self, text: str) -> None:
         """Publish a warning."""
-        self._warning.publish(messages.text(text))
+        self._warning.publish({"data": text})
 
     def diagnose(self, run: ControlRun | None, state: str, fault: str) -> None:
         """Publish diagnostics, once per second."""
@@ -158,8 +161,13 @@ class Telemetry:
                 "log": run.path,
                 "dropped by the log": run.log.dropped,
             }
-        level = messages.ERROR if fault else messages.WARN if flags else messages.OK
-        text = fault or ", ".join(flags) or state
         self._diagnostics.publish(
-            messages.diagnostics(self._clock.wall(), self._name, level, text, values)
+            fields.diagnostics(
+                header_of(self._clock.wall(), ""),
+                values,
+                level=ERROR if fault else WARN if flags else OK,
+                name=self._name,
+                message=fault or ", ".join(flags) or state,
+                hardware_id="tautscope",
+            )
         )

@@ -64,23 +64,18 @@ def _register() -> None:
     info = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\n"
     known.fielddefs[_EVENT_INFO] = ([], _fields(info + "int64 sequence_number"))
     for name, (request, response) in SERVICES.items():
-        parts: list[tuple[str, list[tuple[str, FieldDesc]]]] = [
-            (f"{name}_Request", _fields(request)),
-            (f"{name}_Response", _fields(response)),
-        ]
-        # What introspection of a service publishes is a part of its hash (REP 2016).
-        event: list[tuple[str, FieldDesc]] = [
-            ("info", (Nodetype.NAME, _EVENT_INFO)),
-            ("request", (Nodetype.SEQUENCE, ((Nodetype.NAME, f"{name}_Request"), 1))),
-            ("response", (Nodetype.SEQUENCE, ((Nodetype.NAME, f"{name}_Response"), 1))),
-        ]
-        members: list[tuple[str, FieldDesc]] = [
-            (f"{part}_message", (Nodetype.NAME, f"{name}_{part.capitalize()}"))
-            for part in ("request", "response", "event")
-        ]
+        event: list[tuple[str, FieldDesc]] = [("info", (Nodetype.NAME, _EVENT_INFO))]
+        members: list[tuple[str, FieldDesc]] = []
+        for part in ("request", "response", "event"):
+            kind = f"{name}_{part.capitalize()}"
+            event.append((part, (Nodetype.SEQUENCE, ((Nodetype.NAME, kind), 1))))
+            members.append((f"{part}_message", (Nodetype.NAME, kind)))
         types: Typesdict = {
-            kind: ([], fields)
-            for kind, fields in (*parts, (f"{name}_Event", event), (name, members))
+            f"{name}_Request": ([], _fields(request)),
+            f"{name}_Response": ([], _fields(response)),
+            # What introspection of a service publishes is a part of its hash (REP 2016).
+            f"{name}_Event": ([], event[:-1]),
+            name: ([], members),
         }
         known.register(types)
 

@@ -29,7 +29,6 @@ class Entity(StrEnum):
     PUBLISHER = "MP"
     SUBSCRIPTION = "MS"
     SERVICE = "SS"
-    CLIENT = "SC"
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,6 +52,10 @@ class FaultyRig:
         faults: Kind, time and severity of each fault.
         seed: Random seed; the same seed gives the same bytes.
 
+    Attributes:
+        control_period: Control period [s].
+        true_time: Time of the twin's clock [s], which clock faults do not change.
+
     Raises:
         FieldError: The rig is not a `Twin`, or a fault cannot be applied to images.
     """
@@ -66,27 +70,17 @@ class FaultyRig:
                 raise FieldError(
                     f"faults[{index}].kind", fault.kind, f"one that applies to images: {allowed}"
                 )
-        self._twin = twin
+        self._twin, self.control_period = twin, twin.control_period
         self._faults = tuple(faults)
         self._seed = seed
         self._brake_position: Floats | None = None
         self._reset_faults()
 
     @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return self._twin.control_period
-
-    @property
-    def true_time(self) -> float:
-        """Time of the twin's clock [s], which clock faults do not change."""
-        return self._time
-
-    @property
     def drive_fault(self) -> bool:
         """Whether a drive reports a fault now."""
         return any(
-            fault.kind == "axis_off" and fault.is_active(self._time) for fault in self._faults
+            fault.kind == "axis_off" and fault.is_active(self.true_time) for fault in self._faults
         )
 
     def reset(self) -> Sample:
@@ -115,7 +109,7 @@ class FaultyRig:
 
     def _reset_faults(self) -> None:
         self._brake_position = None
-        self._time = self._twin.time
+        self.true_time = self._twin.time
         self._in_transit: Arrivals = []
         camera = self._twin.config.camera
         self._states = [
@@ -133,7 +127,7 @@ class FaultyRig:
         return [
             fault
             for fault in self._states
-            if fault.spec.row.target in targets and fault.update(self._time)
+            if fault.spec.row.target in targets and fault.update(self.true_time)
         ]
 
     def _step_once(self, command: ArrayLike) -> Sample:
@@ -150,12 +144,12 @@ class FaultyRig:
             motion.PLANT_FAULTS[fault.spec.kind](plant, fault)
         for fault in self._states:
             # A fault that ended restores the plant once: later its values may be another fault's.
-            if not fault.spec.is_active(self._time) and fault.memory.pop("acted", False):
+            if not fault.spec.is_active(self.true_time) and fault.memory.pop("acted", False):
                 plant.bends = fault.memory.pop("bends", plant.bends)
                 plant.tip_force, plant.section_friction = 0.0, 1.0
 
     def _with_sensor_faults(self, sample: Sample) -> Sample:
-        self._time = sample.time
+        self.true_time = sample.time
         if not self._faults:
             return sample
         drives = self._active(Target.DRIVE)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.loop.rig import Frame, Sample
-from tautscope.twin.camera import TwinCamera
+from tautscope.twin.camera import RenderedImage, TwinCamera
 from tautscope.twin.plant import Plant
-from tautscope.twin.sensor import Readout
+from tautscope.twin.sensor import Centreline, Readout
 
 
 class Twin:
@@ -25,31 +25,30 @@ class Twin:
         config: The rig's geometry and `config.twin`.
         images: Whether frames are rendered; without frames the twin is several times faster.
 
+    Attributes:
+        config: The configuration it was made from.
+        control_period: Control period [s].
+
     Wrong when inertia matters (inertias are raised for the time step, see `twin/mjcf.py`), when
     scope or tissue move, or when the instrument touches tissue.
     """
 
     def __init__(self, config: Config, *, images: bool = True) -> None:
-        self._config = config
-        self._period = config.control.period
+        self.config = config
+        self.control_period = config.control.period
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None
         self._ticks = 0
 
     def __repr__(self) -> str:
         clock = "closed" if self._plant is None else f"at {self.time:.3f} s"
-        images = f"{self._config.twin.frame_rate:g} images/s" if self.has_images else "no images"
-        return f"<Twin: seed {self._config.twin.seed}, {images}, {clock}>"
+        images = f"{self.config.twin.frame_rate:g} images/s" if self.has_images else "no images"
+        return f"<Twin: seed {self.config.twin.seed}, {images}, {clock}>"
 
     @property
     def time(self) -> float:
         """Time of its clock [s]."""
-        return self._ticks * self._period
-
-    @property
-    def config(self) -> Config:
-        """The configuration it was made from."""
-        return self._config
+        return self._ticks * self.control_period
 
     @property
     def has_images(self) -> bool:
@@ -63,12 +62,9 @@ class Twin:
         Raises:
             SignalError: Before `reset` or after `close`.
         """
-        return self._require_plant()
-
-    @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return self._period
+        if self._plant is None:
+            raise SignalError("rig", "closed", "a twin after reset() and before close()")
+        return self._plant
 
     @property
     def bends(self) -> float:
@@ -77,22 +73,22 @@ class Twin:
         Raises:
             ConfigError: The value is outside the range of `twin.bends`.
         """
-        return self._require_plant().bends
+        return self.plant.bends
 
     @bends.setter
     def bends(self, value: float) -> None:
-        self._require_plant().bends = self._config.replace(**{"twin.bends": value}).twin.bends
+        self.plant.bends = self.config.replace(**{"twin.bends": value}).twin.bends
 
     def reset(self) -> Sample:
         """Start with a new instrument, settled in the start posture, at time 0."""
-        seed = np.random.SeedSequence(self._config.twin.seed)
+        seed = np.random.SeedSequence(self.config.twin.seed)
         physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
-        self._plant = Plant(self._config, physics)
+        self._plant = Plant(self.config, physics)
         self._timing = timing
         self._ticks = 0
         self._sequence = 0
         self._in_transit: deque[tuple[float, Frame]] = deque()
-        self._readout = Readout(self._config.twin.sensor.readout)
+        self._readout = Readout(self.config.twin.sensor.readout)
         if self._camera is not None:
             self._camera.reset()
         return self._sample(self._plant)
@@ -103,7 +99,7 @@ class Twin:
         Raises:
             SignalError: The command is not three finite numbers.
         """
-        plant = self._require_plant()
+        plant = self.plant
         target = np.asarray(command, dtype=np.float64)
         if target.shape != (3,) or not np.isfinite(target).all():
             raise SignalError("command", command, "three finite numbers [m, rad, rad]")
@@ -115,11 +111,6 @@ class Twin:
         """Release the simulation; `reset` starts a new one."""
         self._plant = None
 
-    def _require_plant(self) -> Plant:
-        if self._plant is None:
-            raise SignalError("rig", "closed", "a twin after reset() and before close()")
-        return self._plant
-
     def _sample(self, plant: Plant) -> Sample:
         time, state = self.time, plant.true_state
         if self._camera is not None:
@@ -127,21 +118,27 @@ class Twin:
         return Sample(time, plant.applied, self._newest_frame(time), state)
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
-        twin = self._config.twin
-        readout = twin.sensor.readout
+        twin, readout = self.config.twin, self.config.twin.sensor.readout
         if readout > 0:
             self._readout.add(time, plant.centreline())
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
-        if time + self._period / 2 < self._sequence / twin.frame_rate:
+        if time + self.control_period / 2 < self._sequence / twin.frame_rate:
             return
         strips = self._readout.strips() if readout > 0 else [plant.centreline()]
-        rendered = camera.draw_strips(strips, self._sequence)
-        truth = rendered.true_features, rendered.true_visible
-        stamp = time - readout / 2 + twin.sensor.stamp_error - self._config.camera.source.delay
-        frame = Frame(rendered.image, stamp, self._sequence, *truth)
+        stamp = time - readout / 2 + twin.sensor.stamp_error - self.config.camera.source.delay
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
-        self._in_transit.append((time + delay, frame))
+        self._draw(camera, strips, stamp, time + delay)
         self._sequence += 1
+
+    def _draw(
+        self, camera: TwinCamera, strips: list[Centreline], stamp: float, arrival: float
+    ) -> None:
+        self._send(camera.draw_strips(strips, self._sequence), self._sequence, stamp, arrival)
+
+    def _send(self, drawn: RenderedImage, sequence: int, stamp: float, arrival: float) -> None:
+        """Put a rendered image in transit."""
+        frame = Frame(drawn.image, stamp, sequence, drawn.true_features, drawn.true_visible)
+        self._in_transit.append((arrival, frame))
 
     def _newest_frame(self, time: float) -> Frame | None:
         newest = None

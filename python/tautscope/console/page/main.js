@@ -224,7 +224,7 @@ function showControls() {
   $("progress").hidden = !state.program;
   $("progress").value = state.progress;
   $("program").textContent = state.program ? `${state.program}: ${Math.round(100 * state.progress)} %` : state.program_ended;
-  const shares = state.score.map((errors) => (errors ? `${Math.round(100 * (1 - errors[0] / errors[1]))} %` : "–")).join(", ");
+  const shares = state.score.map((errors) => (errors?.[1] ? `${Math.round(100 * (1 - errors[0] / errors[1]))} %` : "–")).join(", ");
   $("score").textContent = state.score.some(Boolean)
     ? `Last minute: ${shares} less error than without (by ${state.uncompensated_by}).`
     : "Move for a second to compare with the tip without compensation.";

@@ -38,12 +38,17 @@ class ColonoscopeTwin:
         told_delay: The delay that the measurements' time stamps assume [s]; without it `delay`.
         drift: Largest drift of the measured position [m].
 
+    Attributes:
+        parameters: Of the instrument.
+
     Wrong when inertia matters (inertias are raised for the time step), or when tip or shaft are
     pressed against tissue.
 
     Raises:
         SignalError: `start` is not three finite numbers.
     """
+
+    control_period = CONTROL_PERIOD
 
     def __init__(
         self,
@@ -56,7 +61,7 @@ class ColonoscopeTwin:
         drift: float = 0.0,
     ) -> None:
         self._seed = seed
-        self._parameters = parameters or ColonoscopeParameters.drawn(seed)
+        self.parameters = parameters or ColonoscopeParameters.drawn(seed)
         self._start = _checked("start", start)
         self._delay, self._told_delay, self._drift = delay, told_delay, drift
         self._plant: Plant | None = None
@@ -72,11 +77,6 @@ class ColonoscopeTwin:
         return self._ticks * CONTROL_PERIOD
 
     @property
-    def parameters(self) -> ColonoscopeParameters:
-        """The parameters of the instrument."""
-        return self._parameters
-
-    @property
     def plant(self) -> Plant:
         """The simulated plant, for inspection.
 
@@ -87,15 +87,10 @@ class ColonoscopeTwin:
             raise SignalError("rig", "closed", "a twin after reset() and before close()")
         return self._plant
 
-    @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return CONTROL_PERIOD
-
     def reset(self) -> Sample:
         """Start with a new instrument, settled at the start command, at time 0."""
         generator = np.random.default_rng([self._seed, 2])
-        self._plant = Plant(self._parameters, CONTROL_PERIOD, self._start)
+        self._plant = Plant(self.parameters, CONTROL_PERIOD, self._start)
         self._tracker = EmTracker(generator, self._delay, self._told_delay, self._drift)
         self._ticks = 0
         return self._sample(self._plant)
