@@ -158,8 +158,12 @@ def find_moving_bands(
     stamps, motors = np.asarray(times, np.float64), np.asarray(positions, np.float64)
     if len(images) < LEAST_IMAGES:
         raise FieldError("images", len(images), f"at least {LEAST_IMAGES}")
-    if stamps.shape != (len(images),) or motors.shape != (len(images), 3):
-        raise FieldError("positions", motors.shape, f"({len(images)}, 3), one row per image")
+    for name, array, shape in (
+        ("times", stamps, (len(images),)),
+        ("positions", motors, (len(images), 3)),
+    ):
+        if array.shape != shape:
+            raise FieldError(name, array.shape, f"{shape}, one row per image")
     moving, tissue = _split(images)
     regressors = _regressors(stamps, motors)
     some = slice(None, None, 2)
@@ -298,7 +302,7 @@ def _centre(bands: tuple[Mask, Mask]) -> Floats:
 def _regressors(times: Floats, positions: Floats) -> Floats:
     """The positions now and before: (n, columns), with a constant."""
     spread = np.ptp(positions, axis=0)
-    moved = positions[:, spread > 0] / np.where(spread > 0, spread, 1)[spread > 0]
+    moved = positions[:, spread > 0] / spread[spread > 0]
     if not moved.shape[1]:
         raise CalibrationError("The motors did not move", "Are the drives enabled?")
     delayed = [np.interp(times - lag, times, dof) for lag in _LAGS for dof in moved.T]
