@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SYSTEMATIC = 0.01
 """Standard deviation of what loops take for a delay, or the reverse [s]."""
+_REMEDY = "Check that each motor moves the tip, and move for longer or farther"
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -55,10 +56,9 @@ def _run(options: argparse.Namespace) -> int:
     config, found = _sweep(options, options.keep)
     if found.undetermined:
         keep = " ".join(f"--keep {name}" for name in found.undetermined if "gain" not in name)
-        remedy = "Check that each motor moves the tip, and move for longer or farther"
         raise CalibrationError(
             "The sweep does not determine " + ", ".join(found.undetermined),
-            f"{remedy}, or keep what is configured: {keep}" if keep else remedy,
+            f"{_REMEDY}, or keep what is configured: {keep}" if keep else _REMEDY,
         )
     finish(options, result("robot", found, config))
     return 0
@@ -67,6 +67,10 @@ def _run(options: argparse.Namespace) -> int:
 def run_latency(options: argparse.Namespace) -> int:
     """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
+    lost = [name for name in found.undetermined if name.startswith("measurement.delays")]
+    if lost:
+        what = "The sweep does not determine " + ", ".join(lost)
+        raise CalibrationError(what, _REMEDY)
     finish(options, result("latency", found, config))
     return 0
 
