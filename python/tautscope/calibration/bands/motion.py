@@ -19,17 +19,11 @@ from tautscope.calibration.bands.labels import (
     two_bands,
 )
 from tautscope.calibration.colour import fit_discriminant
-from tautscope.calibration.images import to_bgr
-from tautscope.calibration.motion import (
-    Floats,
-    Image,
-    ImageRecorder,
-    Progress,
-    Sines,
-    article_sines,
-)
+from tautscope.calibration.images import Image, to_bgr
+from tautscope.calibration.motion import ImageRecorder, Progress, Sines, article_sines
 from tautscope.config import Config
 from tautscope.errors import CalibrationError, FieldError, RecordError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
 
 DURATION = 10.0
