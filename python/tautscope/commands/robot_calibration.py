@@ -112,6 +112,12 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         section, key = name.split(".")
         before = getattr(getattr(config, section), key, "not there")
         notes.append(f"{name} was {before}")
+    for name, each in std.items():
+        if name.startswith("measurement.delays") and found.values[name] < -2 * each:
+            notes.append(
+                f"Measurements are stamped {-1e3 * found.values[name]:.0f} ms before the motors' "
+                f"clock: {name} is set to 0, which cannot express it. Check the clock of the sensor"
+            )
     is_written = "actuators.matrix" in values
     written = "in actuators.matrix and offsets" if is_written else "not written"
     units = {dof.name: dof.unit for dof in config.dof}
