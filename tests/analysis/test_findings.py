@@ -9,7 +9,7 @@ import pytest
 from play_model import play
 from records.simulated import Simulated, simulate
 from scipy.signal import lfilter
-from tautscope.analysis.findings import without_errors
+from tautscope.analysis.findings import Finding, without_errors
 from tautscope.analysis.identification import identify
 from tautscope.analysis.verdict import Verdict, judge
 
@@ -209,7 +209,9 @@ def test_units_that_do_not_fit_are_named() -> None:
     record = simulate("play", 0).record
     gain = judged("play", 0).found.gain
     metres = replace(record, measured=record.measured / gain / 1000, units=("mm", "mm"))
-    assert "near the number of mm in 1 m" in judge(metres).text
+    assert "near 1 over the number of mm in 1 m" in judge(metres).text
+    millimetres = replace(record, measured=1000 * record.measured / gain, units=("m", "m"))
+    assert "near the number of mm in 1 m" in judge(millimetres).text
     degrees = replace(record, measured=record.measured / gain, units=("deg", "mm"))
     assert "the command is in deg, the tip in mm" in judge(degrees).text
     slow = replace(record, time=1000 * record.clock)
@@ -230,3 +232,14 @@ def test_a_verdict_says_what_compensation_would_do() -> None:
     assert verdict.compensation.after < 0.4 * verdict.compensation.before
     assert verdict.helps
     assert "With the loop the tip's RMS error would fall from" in verdict.text
+
+
+def test_of_many_places_three_are_named() -> None:
+    lines = tuple((line, line) for line in (8, 10, 12, 14, 16))
+    for count, place in (
+        (1, "(line 8)"),
+        (3, "(lines 8, 10, 12)"),
+        (4, "(lines 8, 10, 12 and 1 more place)"),
+        (5, "(lines 8, 10, 12 and 2 more places)"),
+    ):
+        assert str(Finding("tip", "left out", lines[:count])) == f"tip: left out {place}"

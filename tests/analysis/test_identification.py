@@ -1,5 +1,7 @@
 """Slack that is identified where it is there, and only there: records of known truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from play_model import play
@@ -7,6 +9,7 @@ from records.simulated import UNDETERMINED, WITHOUT_SLACK, simulate
 from tautscope.analysis.delayed_play import Signals
 from tautscope.analysis.identification import (
     Identification,
+    Interval,
     _grid,
     _surrogate_test,
     identify,
@@ -68,6 +71,12 @@ def test_nothing_is_identified_where_nothing_is_determined(kind: str) -> None:
         assert not result.is_identified, (seed, result.width)
         assert not result.is_aligned, seed
         assert result.missing
+
+
+def test_an_uncertain_width_of_0_needs_many_more_strokes() -> None:
+    result = replace(found("play", 0), width=Interval(0.0, 0.0, 2.0))
+    assert result.missing == "it is between 0 and 2 (95 % interval), and not known to ± 10 %"
+    assert result.remedy.startswith("record many more strokes")
 
 
 def test_chance_is_as_rare_as_the_surrogate_test_says() -> None:

@@ -142,6 +142,8 @@ def test_malformed_input_is_refused() -> None:
         find_moving_bands(images[:5], TIMES[:5], positions[:5])
     with pytest.raises(FieldError, match="positions"):
         find_moving_bands(images, TIMES, positions[:-1])
+    with pytest.raises(FieldError, match="times"):
+        find_moving_bands(images, TIMES[:-1], positions)
 
 
 def test_bands_grow_from_clicks() -> None:

@@ -34,11 +34,11 @@ def test_a_written_file_is_yaml_and_is_read_back(
     tmp_path: Path, camera: Intrinsics, model: str
 ) -> None:
     file = tmp_path / "camera.yaml"
-    file.write_text(camera_info(camera, "endoscope"))
+    file.write_text(camera_info(camera))
     assert read_camera_info(file) == camera
     document = YAML(typ="safe").load(file.read_text())
     assert document["distortion_model"] == model
-    assert document["camera_name"] == "endoscope"
+    assert document["camera_name"] == "camera"
     assert (document["image_width"], document["image_height"]) == SIZE
     assert document["camera_matrix"]["data"] == camera.matrix.ravel().tolist()
     assert tuple(document["distortion_coefficients"]["data"]) == camera.distortion

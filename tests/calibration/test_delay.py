@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -161,3 +163,17 @@ def test_no_more_positions_are_used_than_said(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("tautscope.calibration.delay.MOST_POSITIONS", len(times) * 2 // 3)
     assert estimate_delay(times, positions, stamps, tips).is_known
     assert max(used) <= len(times) * 2 // 3
+
+
+def test_the_result_is_json_where_a_motor_rests() -> None:
+    """The gain of the DOF that did not move is unknown, and JSON has no NaN."""
+    times, positions = motors(None)
+    positions[:, 1] = positions[0, 1]
+    stamps, tips = images(times, positions, 0.3, 0.0, seed=1)
+    found = estimate_delay(times, positions, stamps, tips)
+    assert found.model is not None and np.isnan(found.model.gains[1])
+    document = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert document["model"]["gains"][1] is None
+    assert document["model"]["gains"][0] == found.model.gains[0]
+    unknown = estimate_delay(times, positions[:, [0, 0, 0]] * 0, stamps, tips).to_json()
+    assert (unknown["delay"], unknown["is_known"]) == (None, False)

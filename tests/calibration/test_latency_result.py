@@ -1,7 +1,10 @@
 """The delay of the images as a result: two estimates that disagree give none."""
 
 import pytest
+from tautscope import axes
 from tautscope.calibration.delay import DelayEstimate
+from tautscope.calibration.robot import RobotFit
+from tautscope.commands import robot_calibration
 from tautscope.commands.calibrate_latency import result
 from tautscope.config import Config, load_config
 from tautscope.errors import CalibrationError
@@ -50,3 +53,13 @@ def test_the_better_known_delay_is_kept(
 def test_no_answer_is_an_error(found: DelayEstimate, named: str) -> None:
     with pytest.raises(CalibrationError, match=named):
         result(found, known(0.02), {})
+
+
+@pytest.mark.parametrize(("delay", "is_early"), [(-0.2, True), (-0.02, False), (0.2, False)])
+def test_stamps_of_a_robot_that_are_early_are_named(delay: float, is_early: bool) -> None:
+    values = {"measurement.delays[0]": delay, "dof.x.gain": 1.0, "dof.x.slack": 0.1}
+    std = {"measurement.delays[0]": 0.02, "dof.x.gain": 0.01}
+    config = axes(1, names=["x"], width_limit=1.0)
+    result = robot_calibration.result("latency", RobotFit(values, std, {}, ()), config)
+    assert result.values == {"measurement.delays": [max(delay, 0.0)]}
+    assert any("stamped 200 ms before" in note for note in result.notes) == is_early

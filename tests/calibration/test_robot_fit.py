@@ -104,6 +104,17 @@ def test_gains_signs_zeros_and_delay_of_a_measured_tip(seed: int) -> None:
     check(found, true)
 
 
+def test_the_delay_alone_of_a_robot_whose_tip_is_measured() -> None:
+    """As `calibrate latency --rig` keeps the kinematics, of which this robot has none."""
+    rng = np.random.default_rng(5)
+    robot = Robot(lambda q, t: Tip(q + rng.normal(0, 0.01, 2), t), [1, 1], [0, 0], [0.3, 0.6], 0.08)
+    config = CATHETER.replace(kinematics=KinematicsConfig())
+    found = fit(record(robot, config, 15.0), config, keep=("kinematics",))
+    check(found, {"measurement.delays[0]": 0.08 + PERIOD})
+    with pytest.raises(FieldError, match=r"kinematics\.length"):
+        fit(record(robot, config, 12.0), config, keep=("kinematics.length",))
+
+
 def test_the_kinematics_of_a_catheter_in_the_frame_of_a_tracker() -> None:
     rng = np.random.default_rng(0)
 

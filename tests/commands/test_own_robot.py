@@ -247,6 +247,18 @@ def test_the_delay_of_a_rig_is_written_into_its_configuration(
     assert delay == pytest.approx(0.005, abs=0.02)
 
 
+def test_no_delay_is_written_where_the_motors_do_not_move_the_tip(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "still.py").write_text(RIG.replace("tip(self.tip)", "tip(self.tip * 0)"))
+    toml = folder / "robot.toml"
+    before = toml.read_text(encoding="utf-8")
+    options = ["calibrate", "latency", "--config", str(toml), "--rig", "still:Catheter"]
+    assert main([*options, "--seconds", "6", "--yes", "--write"]) == CalibrationError.exit_status
+    assert "does not determine measurement.delays[0]" in capsys.readouterr().err
+    assert toml.read_text(encoding="utf-8") == before
+
+
 @pytest.mark.parametrize("is_stuck", [False, True])
 def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_named(
     is_stuck: bool, folder: Path, capsys: pytest.CaptureFixture[str]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -150,16 +151,12 @@ def analyze(
     with_tip = np.flatnonzero(np.isfinite(record.measured))
     task = Task(record.command, record.measured, half, gain, update_distance, config)
     scored = with_tip[with_tip >= half]
-
     masked = [seen_at(task, share) for share in HORIZONS]
-
-    done, total = 0, len(models) * (1 + len(masked))
+    done, total = count(1), len(models) * (1 + len(masked))
 
     def count_fit() -> None:
-        nonlocal done
-        done += 1
         if progress is not None:
-            progress(done / total)
+            progress(next(done) / total)
 
     def entry(model: Model) -> Entry:
         prediction = model.run(task)

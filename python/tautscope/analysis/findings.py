@@ -56,7 +56,8 @@ class Finding:
         if not self.rows:
             return ""
         shown = [f"{a}" if a == b else f"{a} to {b}" for a, b in self.rows[:3]]
-        more = f" and {len(self.rows) - 3} more places" if len(self.rows) > 3 else ""
+        others = len(self.rows) - 3
+        more = f" and {others} more place{'s' if others > 1 else ''}" if others > 0 else ""
         is_one = len(self.rows) == 1 and self.rows[0][0] == self.rows[0][1]
         return f" (line{'' if is_one else 's'} {', '.join(shown)}{more})"
 
@@ -160,9 +161,9 @@ def gain_finding(record: Record, gain: float) -> Finding | None:
             return Finding("record", what)
         gain *= kinds[1][tip] / kinds[0][command]
     for factor, meaning in _FACTORS.items():
-        for each in (factor, 1 / factor):
+        for each, near in ((factor, meaning), (1 / factor, f"1 over {meaning}")):
             if abs(abs(gain) / each - 1) < 0.03:
-                what = f"the gain in one unit is {gain:.4g}, near {meaning}: check the units"
+                what = f"the gain in one unit is {gain:.4g}, near {near}: check the units"
                 return Finding("record", what)
     return None
 

@@ -29,6 +29,8 @@ NEGLIGIBLE = 0.03
 """Largest slack that would not have been seen, as a share of the tip's range."""
 LEAST_ADVANTAGE = 1.05
 """Error of a lag without slack, over that of the model."""
+MOST_STROKES = 10
+"""Times the strokes of a record that a person can be asked for."""
 _LARGEST = 0.49
 """Largest half width, as a share of the command's range; at 0.5 the play never moves."""
 _RADII = _LARGEST * (np.arange(24) / 24) ** 1.5
@@ -87,27 +89,51 @@ class Identification:
     @property
     def missing(self) -> str:
         """What the record lacks for its width to be known; empty if the width is identified."""
+        return self._lack[0]
+
+    @property
+    def remedy(self) -> str:
+        """What to record for the width to be known; empty if it is identified."""
+        return self._lack[1]
+
+    @property
+    def _lack(self) -> tuple[str, str]:
+        """What is missing, and what to do."""
         if self.strokes < LEAST_STROKES:
             return (
                 f"the tip reverses {self.strokes - 1} times, and each of at least {LEAST_STROKES} "
-                "strokes must cross the slack"
+                "strokes must cross the slack",
+                "record at least ten strokes, back and forth, each several times as long as "
+                "the slack",
             )
         if self.p_value > LARGEST_P:
             return (
                 "the command explains the tip no better than a random walk (surrogate test, "
-                f"p = {self.p_value:.2g})"
+                f"p = {self.p_value:.2g})",
+                "check that the two columns belong together, then record strokes several times "
+                "as long as the slack",
             )
         if self.explanations["a lag"] < LEAST_ADVANTAGE * self.noise:
-            return "a lag without slack explains the record as well"
-        if self.is_at_limit:
-            return "the best fit is at the limit of the search"
-        if not self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
-            limits = f"{self.width.low:.3g} and {self.width.high:.3g} (95 % interval)"
-            between = (
-                f"it is between {limits}, and not known to ± {100 * LARGEST_UNCERTAINTY:.0f} %"
+            return (
+                "a lag without slack explains the record as well",
+                "record the same strokes at half the speed: a lag shrinks with it, slack does not",
             )
-            return "the record fits any width" if math.isinf(self.width.high) else between
-        return ""
+        if self.is_at_limit or not math.isfinite(self.width.high):
+            limit = "the best fit is at the limit of the search"
+            what = limit if self.is_at_limit else "the record fits any width"
+            return what, "record longer and slower strokes"
+        if self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
+            return "", ""
+        least = 1e-9 * self.width.half  # for a width of 0
+        excess = self.width.half / (LARGEST_UNCERTAINTY * max(self.width.value, least))
+        often = f"about {math.ceil(excess**2 * self.strokes)} strokes in place of {self.strokes}"
+        if excess**2 > MOST_STROKES:
+            often = "many more strokes, with all else at rest (other axes, endoscope, sensor)"
+        return (
+            f"it is between {self.width.low:.3g} and {self.width.high:.3g} (95 % interval), and "
+            f"not known to ± {100 * LARGEST_UNCERTAINTY:.0f} %",
+            f"record {often}, each several times as long as the slack, at two speeds",
+        )
 
     @property
     def is_related(self) -> bool:

@@ -18,20 +18,12 @@ from tautscope.analysis.findings import (
     identify_without_repeats,
     without_errors,
 )
-from tautscope.analysis.identification import (
-    LARGEST_UNCERTAINTY,
-    LEAST_ADVANTAGE,
-    LEAST_STROKES,
-    Identification,
-    Interval,
-)
+from tautscope.analysis.identification import Identification, Interval
 from tautscope.report.tables import finite
 from tautscope.runs.records import Record
 
 PARSIMONY = 1.05
 """A simpler explanation is as good if it leaves this factor of the error at most."""
-MOST_STROKES = 10
-"""Times the strokes of a record that a person can be asked for."""
 ROUNDING = 1e-6
 """Smaller errors, over the extent of the tip, are those of the fit: the record is exact."""
 
@@ -52,7 +44,6 @@ class Verdict:
 
     name: str
     columns: tuple[str, str]
-
     record: Record
     found: Identification
     findings: tuple[Finding, ...]
@@ -173,33 +164,7 @@ class Verdict:
             if self._is_late:
                 return f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
             return "command the motor directly; the error that remains is not slack"
-        return self._record_next()
-
-    def _record_next(self) -> str:
-        """What to record, if nothing is identified."""
-        found = self.found
-        if found.strokes < LEAST_STROKES:
-            return (
-                "record at least ten strokes, back and forth, each several times as long as "
-                "the slack"
-            )
-        if not found.is_related:
-            return (
-                "check that the two columns belong together, then record strokes several times "
-                "as long as the slack"
-            )
-        if found.explanations["a lag"] < LEAST_ADVANTAGE * found.noise:
-            return (
-                "record the same strokes at half the speed: a lag shrinks with it, slack does not"
-            )
-        if found.is_at_limit or not math.isfinite(found.width.high):
-            return "record longer and slower strokes"
-        excess = found.width.half / (LARGEST_UNCERTAINTY * max(found.width.value, 1e-300))
-        count = math.ceil(excess**2 * found.strokes)
-        often = f"about {count} strokes in place of {found.strokes}"
-        if excess**2 > MOST_STROKES:
-            often = "many more strokes, with all else at rest (other axes, endoscope, sensor)"
-        return f"record {often}, each several times as long as the slack, at two speeds"
+        return found.remedy
 
 
 def judge(

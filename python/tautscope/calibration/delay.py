@@ -24,10 +24,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -125,12 +126,9 @@ class DelayEstimate:
         return values - self.delay - self.drift * (values - first)
 
     def to_json(self) -> dict[str, Any]:
-        """The values by name; None where unknown."""
-        document = asdict(self) | {"is_known": self.is_known}
-        return {
-            name: None if isinstance(value, float) and math.isnan(value) else value
-            for name, value in document.items()
-        }
+        """The values by name, and those of the probes; None where unknown."""
+        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
+        return document | {"is_known": self.is_known}
 
 
 def estimate_delay(

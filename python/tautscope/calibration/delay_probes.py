@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,9 +59,8 @@ class Signal:
 
     def thinned(self, stride: int) -> Signal:
         """The same with every ``stride``-th image, for a first search."""
-        new = object.__new__(Signal)
-        images = {"stamps": self.stamps[::stride], "tip": self.tip[::stride]}
-        new.__dict__ = self.__dict__ | images
+        new = copy(self)
+        new.stamps, new.tip = self.stamps[::stride], self.tip[::stride]
         return new
 
     def images(self, shown: Floats, first: int, last: int) -> slice | None:

@@ -16,13 +16,13 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MotionHeldError, SignalError
 from tautscope.loop.actuators import with_actuators
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.references import Reference, Segment
 from tautscope.loop.rig import Rig, Sample, check_sample
 from tautscope.loop.safety import Reaction
 
-Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Progress = Callable[[float], None]
 """Called with the share of the motion done, 0 to 1, once per second."""

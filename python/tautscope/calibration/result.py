@@ -17,7 +17,8 @@ class CalibrationResult:
     """Values found by one kind of calibration.
 
     Attributes:
-        kind: ``camera``, ``colour``, ``geometry``, ``latency`` or ``robot``.
+        kind: ``camera``, ``colour``, ``geometry``, ``latency`` or ``robot``; or a step without
+            values of ``tautscope calibrate all``.
         values: Dotted path of a key -> value, as for `Config.replace`.
         std: Standard deviation by dotted path, ``camera.distortion[0]`` for an item of a list.
         residual: Root mean square of the residuals [px], or None.

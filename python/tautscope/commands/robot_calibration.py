@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SYSTEMATIC = 0.01
 """Standard deviation of what loops take for a delay, or the reverse [s]."""
+_REMEDY = "Check that each motor moves the tip, and move for longer or farther"
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -55,10 +56,9 @@ def _run(options: argparse.Namespace) -> int:
     config, found = _sweep(options, options.keep)
     if found.undetermined:
         keep = " ".join(f"--keep {name}" for name in found.undetermined if "gain" not in name)
-        remedy = "Check that each motor moves the tip, and move for longer or farther"
         raise CalibrationError(
             "The sweep does not determine " + ", ".join(found.undetermined),
-            f"{remedy}, or keep what is configured: {keep}" if keep else remedy,
+            f"{_REMEDY}, or keep what is configured: {keep}" if keep else _REMEDY,
         )
     finish(options, result("robot", found, config))
     return 0
@@ -67,6 +67,10 @@ def _run(options: argparse.Namespace) -> int:
 def run_latency(options: argparse.Namespace) -> int:
     """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
+    lost = [name for name in found.undetermined if name.startswith("measurement.delays")]
+    if lost:
+        what = "The sweep does not determine " + ", ".join(lost)
+        raise CalibrationError(what, _REMEDY)
     finish(options, result("latency", found, config))
     return 0
 
@@ -108,6 +112,12 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         section, key = name.split(".")
         before = getattr(getattr(config, section), key, "not there")
         notes.append(f"{name} was {before}")
+    for name, each in std.items():
+        if name.startswith("measurement.delays") and found.values[name] < -2 * each:
+            notes.append(
+                f"Measurements are stamped {-1e3 * found.values[name]:.0f} ms before the motors' "
+                f"clock: {name} is set to 0, which cannot express it. Check the clock of the sensor"
+            )
     is_written = "actuators.matrix" in values
     written = "in actuators.matrix and offsets" if is_written else "not written"
     units = {dof.name: dof.unit for dof in config.dof}

@@ -212,12 +212,12 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         "fig9": (
             figures.figure9(demo.uncompensated, demo.compensated, demo.article),
             _figure9_caption(demo),
-        )
+        ),
+        "operator_motion": (
+            draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
+            _OPERATOR_CAPTION.format(demo.seeds[0]),
+        ),
     }
-    drawn["operator_motion"] = (
-        draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
-        _OPERATOR_CAPTION.format(demo.seeds[0]),
-    )
     if demo.compensated.snapshot is not None:
         figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
         drawn["fig5"] = figure5, FIGURE5_CAPTION

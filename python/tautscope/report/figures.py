@@ -174,7 +174,9 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
                 (left - 0.5, top - 0.5), width, height, fill=False, color=SKY, linewidth=1.2
             )
             axes[2].add_patch(outline)
-        axes[2].legend(handles=_region_legend(), **_ON_IMAGE)
+        shown = Rectangle((0, 0), 1, 1, fill=False, color=SKY, label="region of the mask")
+        marker = Line2D([], [], color="white", linestyle="", marker="+", label="measured marker")
+        axes[2].legend(handles=[shown, marker], **_ON_IMAGE)
         axis_direction = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
         _label_marker(axes[2], "A", measured[0], -axis_direction)
         _label_marker(axes[2], "B", measured[1], axis_direction)
@@ -192,12 +194,6 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
             axis.set_title(f"({letter}) {title}")
             axis.set_axis_off()
     return figure
-
-
-def _region_legend() -> list[Artist]:
-    region = Rectangle((0, 0), 1, 1, fill=False, color=SKY, label="region of the mask")
-    marker = Line2D([], [], color="white", linestyle="", marker="+", label="measured marker")
-    return [region, marker]
 
 
 def _label_marker(

@@ -10,13 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.images import Image
 from tautscope.loop.construction import build_feature_model
 from tautscope.report.operator_motion import EVALUATED_AFTER
 from tautscope.runs.recording import Floats, Recording, per_dof
 from tautscope.twin import Twin
 from tautscope.twin.camera import TwinCamera
-
-Image = NDArray[np.uint8]
 
 SECONDS, RATE = 10.0, 10.0
 """Length of the film [s], and its images per second."""

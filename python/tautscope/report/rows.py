@@ -10,8 +10,6 @@ from tautscope.dof import Dof, NamedDof
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Worst = Literal["min", "max"]
-
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -33,7 +31,7 @@ class Row:
     title: str
     meaning: str
     kind: Literal["length", "share", "number", "count"] = "length"
-    worst: Worst = "max"
+    worst: Literal["min", "max"] = "max"
     goal: float | tuple[float, float, float] | None = None
     in_summary: bool = False
     name: str = ""

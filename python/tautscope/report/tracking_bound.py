@@ -8,15 +8,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tautscope.config import Config, LawConfig
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
-from tautscope.report.metrics import reduction, tracking_rms
+from tautscope.report.metrics import Floats, reduction, tracking_rms
 from tautscope.report.rows import ARTICLE
 
-Floats = NDArray[np.float64]
 Pair = tuple[float, float]
 
 GAIN_LIMIT = LawConfig().free_gain

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +29,7 @@ REFIT_WALKS = np.array([(d, 0.0) for d in (0.003, 0.01, 0.03, 0.1, 0.3)])
 """Random walks of disturbance and coefficients, see `track`."""
 FIRST_FIT, GROWTH = 8, 1.25
 """Measured tips of the first fit, and factor to the next."""
+Fitted = constant_play.ConstantPlay | prandtl_ishlinskii.PrandtlIshlinskii
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +60,6 @@ class Component:
     name: str
     predicted: Floats
     refits: list[Refit] = field(default_factory=list)
-
-
-class Fitted(Protocol):
-    """Parameters of a model of hysteresis."""
-
-    def predict(self, command: Floats) -> Floats:
-        """Tip (n,) for a command (n,)."""
 
 
 @dataclass(frozen=True, eq=False)

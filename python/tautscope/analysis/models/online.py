@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
@@ -33,19 +32,13 @@ RECORD = {
 """Prior of a record: nothing is known of its slack, and its tip is measured directly."""
 
 
-class OnlineEstimator(Protocol):
-    """An estimator whose input has the tip's unit and direction."""
+Make = Callable[[Config, float], Estimator | TipFilter]
+"""Makes an estimator of a configuration and an update distance [tip's unit].
 
-    def run(self, commands: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
-        """Predicted tip, delta_minus and delta_plus, (n,) each; causal.
-
-        `predicted[k]` uses `commands[:k + 1]` and `measured[:k]`; the offsets are those after
-        sample k. A NaN in `measured` is skipped.
-        """
-
-
-Make = Callable[[Config, float], OnlineEstimator]
-"""Makes an estimator of a configuration and an update distance [tip's unit]."""
+Its `run` gives predicted tip, delta_minus and delta_plus, (n,) each, for commands in the tip's unit
+and direction and measured tips, NaN where there is none. Sample k of the prediction uses the
+commands up to k and the tips before k; the offsets are those after sample k.
+"""
 
 
 @dataclass(frozen=True)
@@ -114,7 +107,7 @@ def update_distance(task: Task, scale: InputScale) -> float:
     return UPDATE_SHARE * abs(scale.gain) * float(np.ptp(task.first_half[0]))
 
 
-def paper(config: Config, update_distance: float) -> OnlineEstimator:
+def paper(config: Config, update_distance: float) -> Estimator:
     """The article's estimator; the offsets start at 0."""
     settings = config.insertion
     return Estimator(
@@ -126,7 +119,7 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
     )
 
 
-def fixed_plays(config: Config, update_distance: float) -> OnlineEstimator:
+def fixed_plays(config: Config, update_distance: float) -> TipFilter:
     """The filter of profile ``best`` with the prior `RECORD`."""
     return TipFilter(
         core_settings(config.replace(**RECORD)),

@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.motion import Floats, Image
+from tautscope.calibration.images import Image
 from tautscope.errors import CalibrationError, FieldError
+from tautscope.loop.kinematics import Floats
 
 Mask = NDArray[np.uint8]
 

@@ -19,17 +19,11 @@ from tautscope.calibration.bands.labels import (
     two_bands,
 )
 from tautscope.calibration.colour import fit_discriminant
-from tautscope.calibration.images import to_bgr
-from tautscope.calibration.motion import (
-    Floats,
-    Image,
-    ImageRecorder,
-    Progress,
-    Sines,
-    article_sines,
-)
+from tautscope.calibration.images import Image, to_bgr
+from tautscope.calibration.motion import ImageRecorder, Progress, Sines, article_sines
 from tautscope.config import Config
 from tautscope.errors import CalibrationError, FieldError, RecordError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
 
 DURATION = 10.0
@@ -158,8 +152,12 @@ def find_moving_bands(
     stamps, motors = np.asarray(times, np.float64), np.asarray(positions, np.float64)
     if len(images) < LEAST_IMAGES:
         raise FieldError("images", len(images), f"at least {LEAST_IMAGES}")
-    if stamps.shape != (len(images),) or motors.shape != (len(images), 3):
-        raise FieldError("positions", motors.shape, f"({len(images)}, 3), one row per image")
+    for name, array, shape in (
+        ("times", stamps, (len(images),)),
+        ("positions", motors, (len(images), 3)),
+    ):
+        if array.shape != shape:
+            raise FieldError(name, array.shape, f"{shape}, one row per image")
     moving, tissue = _split(images)
     regressors = _regressors(stamps, motors)
     some = slice(None, None, 2)
@@ -298,7 +296,7 @@ def _centre(bands: tuple[Mask, Mask]) -> Floats:
 def _regressors(times: Floats, positions: Floats) -> Floats:
     """The positions now and before: (n, columns), with a constant."""
     spread = np.ptp(positions, axis=0)
-    moved = positions[:, spread > 0] / np.where(spread > 0, spread, 1)[spread > 0]
+    moved = positions[:, spread > 0] / spread[spread > 0]
     if not moved.shape[1]:
         raise CalibrationError("The motors did not move", "Are the drives enabled?")
     delayed = [np.interp(times - lag, times, dof) for lag in _LAGS for dof in moved.T]

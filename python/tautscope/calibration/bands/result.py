@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, LabelledImage
 from tautscope.calibration.colour import fit_discriminant
-from tautscope.calibration.motion import Image
+from tautscope.calibration.images import Image
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
 from tautscope.figure_style import BLACK, GREEN, GREY

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.images import Image
 from tautscope.errors import FieldError, OutputError
-
-Image = NDArray[np.uint8]
 
 MODULES = 8
 """Modules (black or white cells) per side of a square; a marker has 6."""
@@ -85,12 +84,10 @@ class Board:
 
         Raises:
             FieldError: The board is larger than the page.
-            OutputError: The file exists or cannot be written.
+            OutputError: The file cannot be written.
         """
         from matplotlib.figure import Figure  # noqa: PLC0415
 
-        if path.exists():
-            raise OutputError("board", str(path), "a file that does not exist yet")
         width, height = self.columns * self.square, self.rows * self.square
         page = (_A4[1], _A4[0]) if width > _A4[0] - 0.02 else _A4
         if width > page[0] - 0.02 or height > page[1] - 0.05:

@@ -19,7 +19,7 @@ _SKEW = 5e-3
 """Largest skew of a fisheye lens, as a share of its focal length: a pixel at the edge."""
 
 
-def camera_info(camera: Intrinsics, name: str = "camera") -> str:
+def camera_info(camera: Intrinsics) -> str:
     """The text of a camera_info file of an unrectified camera."""
     coefficients = camera.distortion
     if camera.model == "fisheye":
@@ -32,7 +32,7 @@ def camera_info(camera: Intrinsics, name: str = "camera") -> str:
     width, height = camera.size
     return "".join(
         (
-            f"image_width: {width}\nimage_height: {height}\ncamera_name: {name}\n",
+            f"image_width: {width}\nimage_height: {height}\ncamera_name: camera\n",
             _matrix("camera_matrix", 3, 3, (fx, 0, cx, 0, fy, cy, 0, 0, 1)),
             f"distortion_model: {model}\n",
             _matrix("distortion_coefficients", 1, len(coefficients), coefficients),

@@ -9,13 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.camera.board import (
-    LARGEST_SATURATED_SHARE,
-    SATURATED,
-    Board,
-    Image,
-    View,
-)
+from tautscope.calibration.camera.board import LARGEST_SATURATED_SHARE, SATURATED, Board, View
+from tautscope.calibration.images import Image
 from tautscope.errors import CalibrationError
 
 COLUMNS, ROWS = 4, 3
@@ -123,8 +118,6 @@ class ViewCollector:
         self.views: list[View] = []
         self.coverage = Coverage(size, board)
         self.rejected: Counter[str] = Counter()
-        self._board = board
-        self._size = size
         self._is_stream = is_stream
         self._last: View | None = None
 
@@ -156,9 +149,10 @@ class ViewCollector:
     def _reason(self, image: Image) -> str:
         """Why an image is not used; empty if it is."""
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-        if (grey.shape[1], grey.shape[0]) != self._size:
-            return f"not of the size {self._size[0]} x {self._size[1]}"
-        view = self._board.find(grey)
+        width, height = self.coverage.size
+        if grey.shape != (height, width):
+            return f"not of the size {width} x {height}"
+        view = self.coverage.board.find(grey)
         last, self._last = self._last, view
         saturated = float((grey >= SATURATED).mean()) if view is None else view.saturated
         if saturated > LARGEST_SATURATED_SHARE:
@@ -176,7 +170,7 @@ class ViewCollector:
             return "beyond the number needed"
         if last is None or _distance(view, last) > LARGEST_MOTION:
             return "with the board in motion"
-        least = LEAST_DIFFERENCE * self._size[0]
+        least = LEAST_DIFFERENCE * self.coverage.size[0]
         if any(_distance(view, other) < least for other in self.views):
             return "like others"
         return ""

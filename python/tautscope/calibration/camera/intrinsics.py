@@ -118,8 +118,7 @@ def _fit(
     except cv2.error as error:
         what = f"OpenCV cannot determine the camera from {len(views)} views ({error.err})"
         raise CalibrationError(what, "Show the board tilted, in all parts of the image") from None
-    values = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
-    fx, fy, cx, cy = map(float, values)
+    (fx, _, cx), (_, fy, cy), _ = matrix.tolist()
     camera = Intrinsics(size, model, (fx, fy), (cx, cy), tuple(map(float, distortion)))
     count = 4 + len(camera.distortion)
     information = np.zeros((count, count))
@@ -140,11 +139,9 @@ def _fit(
         covariance = variance * np.linalg.inv(information)
     except np.linalg.LinAlgError:
         covariance = np.full((count, count), np.inf)
-    std = np.sqrt(np.abs(np.diag(covariance)))
+    std = tuple(np.sqrt(np.abs(np.diag(covariance))).tolist())
     residual = float(np.sqrt((every**2).sum(axis=1).mean()))
-    used = tuple(views)
-    deviations = tuple(map(float, std))
-    return CameraFit(camera, deviations, residual, tuple(errors), used, left_out, every)
+    return CameraFit(camera, std, residual, tuple(errors), tuple(views), left_out, every)
 
 
 def _calibrate(

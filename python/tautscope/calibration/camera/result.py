@@ -55,17 +55,9 @@ def camera_values(camera: Intrinsics) -> tuple[dict[str, Any], tuple[str, ...]]:
         CalibrationError: The lens cannot be converted.
     """
     converted, error = to_loop_model(camera)
-    (fx, fy), (cx, cy) = converted.focal, converted.centre
-    width, height = camera.size
-    values = {
-        "camera.width": width,
-        "camera.height": height,
-        "camera.fx": fx,
-        "camera.fy": fy,
-        "camera.cx": cx,
-        "camera.cy": cy,
-        "camera.distortion": converted.distortion,
-    }
+    names = ("width", "height", "fx", "fy", "cx", "cy", "distortion")
+    found = (*camera.size, *converted.focal, *converted.centre, converted.distortion)
+    values = {f"camera.{name}": value for name, value in zip(names, found, strict=True)}
     if camera.model == "pinhole":
         return values, ()
     note = (

@@ -11,19 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.bands.labels import centroid, two_bands
-from tautscope.calibration.images import to_bgr
-from tautscope.calibration.motion import (
-    DURATION,
-    Floats,
-    Image,
-    ImageRecorder,
-    Progress,
-    sweep_motion,
-)
+from tautscope.calibration.images import Image, to_bgr
+from tautscope.calibration.motion import DURATION, ImageRecorder, Progress, sweep_motion
 from tautscope.config import CameraConfig, Config
 from tautscope.errors import RecordError, SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
 from tautscope.loop.vision import Detection, MarkerDetector
 
@@ -141,9 +135,8 @@ class Recorder(ImageRecorder):
         self._vision = config.vision
         self._detector = MarkerDetector(config)
         self._model = build_feature_model(config)
-        self._images: list[tuple[float, Floats, Patch, float]] = []
+        self._images: list[tuple[float, Floats, Floats, Patch, float]] = []
         self._reasons = Counter[str]()
-        self._regions: list[tuple[float, Floats]] = []
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
         """Search the bands in an image, and keep its features and its pixels around the bands.
@@ -156,13 +149,14 @@ class Recorder(ImageRecorder):
         if not detection.valid:
             self._reasons[generic(detection.reason)] += 1
         features = detection.features if detection.valid else np.full(4, np.nan)
-        self._regions.append((captured_at, self._by_regions(image)))
         patch = self._patch(image, detection)
         pixels = patch.pixels
         if pixels.ndim == 2:  # planes: brightness, and below it colour
             pixels = pixels[: self._camera.height, :, None]
         is_saturated = pixels.max(axis=-1) == 255 if pixels.size else np.zeros(1)
-        self._images.append((captured_at, features, patch, float(np.mean(is_saturated))))
+        saturated = float(np.mean(is_saturated))
+        by_regions = self._by_regions(image)
+        self._images.append((captured_at, features, by_regions, patch, saturated))
         return detection
 
     def _by_regions(self, image: Image) -> Floats:
@@ -192,9 +186,9 @@ class Recorder(ImageRecorder):
             raise RecordError("recording", found, "both, of the same motion")
         times, motors = zip(*self.ticks, strict=True)
         images = sorted(self._images, key=lambda each: each[0])
-        captured_at, features, patches, saturated = zip(*images, strict=True)
+        captured_at, features, by_regions, patches, saturated = zip(*images, strict=True)
         if np.isfinite(features).all(axis=1).mean() < LEAST_FOUND:
-            _, features = zip(*sorted(self._regions, key=lambda each: each[0]), strict=True)
+            features = by_regions
         return Recording(
             np.array(times),
             np.array(motors),

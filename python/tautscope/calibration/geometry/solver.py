@@ -82,12 +82,12 @@ def solve(
         free_states: Do not use the expected tip: geometry from the images alone.
     """
     z = np.zeros(len(active)) if start is None else start.copy()
-    images = _Images(model.expected(z), np.ones((model.count, 4)), np.ones((model.count, 4)))
-    damping, last = 1.0, np.inf
+    states, damping, last = model.expected(z), 1.0, np.inf
     pick = np.ix_(active, active)
     for _ in range(_ITERATIONS):
-        images = _most_probable(model, z, images, free_states)
-        information, scores = _equations(model, z, images, active, free_states)
+        images = _most_probable(model, z, states, free_states)
+        states = images.states
+        information, scores = _equations(model, z, images, active)
         step, std = np.zeros(len(z)), np.ones(len(z))
         step[active] = np.linalg.solve(information[pick], (scores.sum(axis=0) - z)[active])
         std[active] = np.sqrt(np.diag(np.linalg.inv(information[pick])))
@@ -99,8 +99,8 @@ def solve(
         z = z + step * damping * min(1.0, _LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
         if size < TOLERANCE:
             break
-    images = _most_probable(model, z, images, free_states)
-    information, scores = _equations(model, z, images, active, free_states)
+    images = _most_probable(model, z, states, free_states)
+    information, scores = _equations(model, z, images, active)
     last_step = float(sizes[RESULTS].max())
     covariance = np.zeros_like(information)
     covariance[pick] = _covariance(information[pick], scores[:, active], model.data.captured_at)
@@ -110,15 +110,17 @@ def solve(
     return Solution(z, covariance, images.states, residuals, model.expected(z), last_step)
 
 
-def _most_probable(model: Model, z: Floats, images: _Images, free_states: bool) -> _Images:
+def _most_probable(model: Model, z: Floats, states: Floats, free_states: bool) -> _Images:
     """Two Gauss-Newton steps of each image's state, with new weights."""
-    states, expected = images.states, model.expected(z)
+    expected = model.expected(z)
     bound = 3 * model.state_std
     for _ in range(2):
         residuals, jacobian = _whitened(model, z, states)
         weights = _soft_l1(residuals)
         from_expected = (states - expected) / model.state_std
-        state_weights = _state_weights(from_expected, free_states)
+        state_weights = _soft_l1(from_expected)
+        if free_states:
+            state_weights[:, :3] = _FREE
         transposed = (jacobian * weights[:, :, None]).transpose(0, 2, 1)
         prior = (state_weights / model.state_std**2)[:, None, :] * np.eye(4)
         gradient = np.einsum("nij,nj->ni", transposed, residuals)
@@ -130,7 +132,7 @@ def _most_probable(model: Model, z: Floats, images: _Images, free_states: bool) 
 
 
 def _equations(
-    model: Model, z: Floats, images: _Images, active: NDArray[np.bool_], free_states: bool
+    model: Model, z: Floats, images: _Images, active: NDArray[np.bool_]
 ) -> tuple[Floats, Floats]:
     """Information (parameters, parameters) with the prior, and each image's score (images, ...)."""
     states = images.states
@@ -182,10 +184,3 @@ def _whitened(model: Model, z: Floats, states: Floats) -> tuple[Floats, Floats]:
 
 def _soft_l1(residuals: Floats) -> Floats:
     return np.asarray(1 / np.sqrt(1 + residuals**2 / _DEGREES))
-
-
-def _state_weights(from_expected: Floats, free_states: bool) -> Floats:
-    weights = _soft_l1(from_expected)
-    if free_states:
-        weights[:, :3] = _FREE
-    return weights

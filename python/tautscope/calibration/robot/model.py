@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,7 +12,7 @@ from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, with_values
 from tautscope.config import Config
 from tautscope.loop.kinematics import STEP, Floats, build_kinematics, own_kinematics
-from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, check_rotation
+from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, Tip, check_rotation
 
 PLAYS = 8
 """Parallel plays of a degree of freedom, with half widths from 0 to half of `width_limit`."""
@@ -170,17 +169,15 @@ def _own(record: MotionRecord) -> list[Measurement]:
     found = [each for each in record.measurements if each.captured_at > after]
     own = [[each for each in found if each.sensor == k] for k in {each.sensor for each in found}]
     kept = [each for of in own for each in of[:: -(-len(of) // MOST)]]
-    return [replace(each) for each in sorted(kept, key=lambda each: each.captured_at)]
+    return sorted(kept, key=lambda each: each.captured_at)
 
 
 def _groups(measurement: Measurement, count: int) -> list[str]:
-    if measurement.covariance is not None:
+    if measurement.covariance is not None or isinstance(measurement, Tip):
         return [""] * count
     if isinstance(measurement, Points):
         return ["point_deviation"] * count
-    if isinstance(measurement, Pose):
-        return (["position_deviation"] * 3 + ["orientation_deviation"] * 3)[:count]
-    return [""] * count
+    return (["position_deviation"] * 3 + ["orientation_deviation"] * 3)[:count]
 
 
 def _plays(command: Floats, half_widths: Floats) -> list[Floats]:

@@ -40,7 +40,7 @@ def fitted(
     motors: they could not be told from the pose of the base.
 
     Raises:
-        FieldError: `keep` names none.
+        FieldError: `keep` names none, and is not "kinematics", of which a robot may have nothing.
     """
     kinds = {type(each) for each in measurements}
     poses = [each for each in measurements if isinstance(each, Pose)]
@@ -70,7 +70,7 @@ def fitted(
         found += _vector(config, "sensor_rotation", ANGLE)
     names = [each.name for each in found]
     for name in keep:
-        if not any(_is_named(each, name) for each in names):
+        if name != "kinematics" and not any(_is_named(each, name) for each in names):
             raise FieldError("--keep", name, ", ".join(names))
     return tuple(each for each in found if not any(_is_named(each.name, name) for name in keep))
 
