@@ -187,6 +187,27 @@ class Line:
         return np.array([[100.0 * q[0] + 300.0, 200.0]])
 
 
+class Blind(Line):
+    """A point whose place is not known where it is calibrated."""
+
+    def points(self, q: np.ndarray) -> np.ndarray:
+        return np.full((1, 2), np.nan)
+
+
+def test_kinematics_that_predict_no_number_are_named() -> None:
+    config = axes(1, width_limit=1.0).replace(
+        **{"control.period": PERIOD, "kinematics.kind": f"{__name__}:Line"},
+        dof=[{"name": "axis", "width_limit": 1.0, "range": (-2.0, 2.0)}],
+    )
+
+    def measure(q: np.ndarray, time: float) -> Points:
+        return Points(Line().points(q), time)
+
+    run = record(Robot(measure, [1.0], [0.0], [0.4]), config)
+    with pytest.raises(CalibrationError, match="no finite tip"):
+        fit(run, config.replace(**{"kinematics.kind": f"{__name__}:Blind"}))
+
+
 def test_two_sensors_whose_measurements_alternate_are_both_used() -> None:
     rng = np.random.default_rng(0)
 

@@ -107,6 +107,7 @@ def test_a_log_reads_back_as_the_run(recorded: Recorded, config: Config) -> None
     assert log.warnings == ()
     assert log.config == config
     assert log.versions["tautscope"]
+    assert log.versions["cv2"] == cv2.__version__  # whichever package of OpenCV is installed
     again = log.recording()
     assert_same(again.trace, recording.trace)
     assert_same(again.frames, recording.frames)

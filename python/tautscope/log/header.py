@@ -7,8 +7,10 @@ import platform
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 
+import cv2
+import mcap
+import numpy as np
 import tomlkit
 
 from tautscope._core import __version__
@@ -48,7 +50,7 @@ def software_versions() -> dict[str, str]:
         "tautscope": __version__,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
-        **{name: version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
+        **{module.__name__: module.__version__ for module in (np, cv2, mcap)},
     }
 
 

@@ -227,6 +227,9 @@ def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
         misfit = float(np.mean(np.abs(left)))
         if misfit < _PREFERRED * best:
             best, found, chosen = misfit, p, model.signs
+    if not np.isfinite(best):
+        what = "The kinematics predict no finite tip with any signs of the motors"
+        raise CalibrationError(what, "Check the kinematics with the states of the motion")
     model.signs = chosen
     return found
 
