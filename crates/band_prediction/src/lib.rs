@@ -97,13 +97,13 @@ impl<'a> ModelPredictor<'a> {
             Some((state, std)) => (std::slice::from_ref(state), *std),
             None => (self.workspace.states.as_slice(), self.workspace.std),
         };
-        let beliefs = core::Beliefs {
+        let priors = core::StatePriors {
             states,
             deviation,
             model_deviation: self.model_deviation,
             geometry: self.geometry,
         };
-        self.model.expect(&beliefs, observed, std)
+        self.model.expect(&priors, observed, std)
     }
 }
 

@@ -104,7 +104,7 @@ impl FeatureModel {
         features: Vector<'py>,
         std: Vector<'py>,
     ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, f64)>> {
-        let prior = core::Belief {
+        let prior = core::StatePrior {
             state: fixed("state", &state)?,
             deviation: fixed("state_std", &state_std)?,
         };

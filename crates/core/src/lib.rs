@@ -70,7 +70,7 @@ pub use dof::Friction;
 pub use error::ConfigError;
 pub use estimation::axis_filter::AxisFilter;
 pub use estimation::estimate_settings::EstimateSettings;
-pub use estimation::expectation::{Belief, Beliefs, Expected};
+pub use estimation::expectation::{Expected, StatePrior, StatePriors};
 pub use estimation::history::{Entry, history_entries};
 pub use law::settings::LawSettings;
 pub use r#loop::any_loop::{BandLoop, DOFS, Loop};

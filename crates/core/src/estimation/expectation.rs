@@ -1,4 +1,4 @@
-//! Where the bands should be and how they look, before an image is looked at and while it is.
+//! Predicted places and shapes of the bands, before an image and with its features.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -12,9 +12,9 @@ use crate::model::outline::BandImage;
 /// States from which the best is sought.
 const STARTS: usize = 3;
 
-/// What is believed of the state before a measurement is looked at: normal, each DOF by itself.
+/// Normal distribution of the state before a measurement, each DOF independent of the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief<const N: usize = 3> {
+pub struct StatePrior<const N: usize = 3> {
     /// Most probable state (N,) [m or rad].
     pub state: [f64; N],
     /// Standard deviations (N,) [m or rad].
@@ -47,8 +47,9 @@ impl Sensor<3, 4, ERRORS> for Displaced<'_> {
     }
 }
 
-impl Belief {
-    fn prior(&self) -> Prior<3, ERRORS> {
+impl StatePrior {
+    /// With the errors of the geometry, in their standard deviations.
+    fn with_geometry(&self) -> Prior<3, ERRORS> {
         Prior {
             state: self.state.into(),
             covariance: SMatrix::from_diagonal(&self.deviation.map(square).into()),
@@ -72,9 +73,9 @@ fn observed(features: [f64; 4], deviation: [f64; 4]) -> Observed<4> {
     }
 }
 
-/// What is believed of the instrument's state: one of several, equally likely.
+/// Distribution of the instrument's state before an image: about one of several states, equally likely.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beliefs<'a> {
+pub struct StatePriors<'a> {
     /// Each (3,) [m, rad, rad]. Several stand for a workspace, in which no place is surprising.
     pub states: &'a [PerDof<f64>],
     /// Standard deviations of each (3,) [m, rad, rad].
@@ -88,7 +89,7 @@ pub struct Beliefs<'a> {
 /// What the model says of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
-    /// Where the belief has the bands' centroids, `[u_A, v_A, u_B, v_B]` (px).
+    /// Where the prior has the bands' centroids, `[u_A, v_A, u_B, v_B]` (px).
     pub features: [f64; 4],
     /// Their covariance (4, 4) (px^2).
     pub covariance: [[f64; 4]; 4],
@@ -101,15 +102,15 @@ pub struct Expected {
 }
 
 impl FeatureModel {
-    /// The most probable state (3,), and its squared Mahalanobis distance from belief and features, for features (4,) with
+    /// The most probable state (3,), and its squared Mahalanobis distance from prior and features, for features (4,) with
     /// standard deviations (4,) in px: a Gauss-Newton with each step halved while it makes things worse.
     ///
     /// A feature of infinite deviation, or that is not finite, says nothing. None where the model sees no band. Wrong in another
-    /// valley than the belief's.
+    /// valley than the prior's.
     #[must_use]
     pub fn nearest_state(
         &self,
-        belief: &Belief,
+        prior: &StatePrior,
         features: [f64; 4],
         deviation: [f64; 4],
     ) -> Option<(PerDof<f64>, f64)> {
@@ -117,13 +118,13 @@ impl FeatureModel {
             model: self,
             deviation: GeometryDeviation::EXACT,
         };
-        nearest(&exact, belief, &observed(features, deviation))
+        nearest(&exact, prior, &observed(features, deviation))
     }
 
     /// What to expect of an image in which features (4,) in px were seen with standard deviations (4,) in px:
     ///
     /// ```text
-    /// q = the likeliest posture by `nearest_state`, over the believed states q0
+    /// q = the likeliest posture by `nearest_state`, over the states q0 of the prior
     /// features = h(q) + L(q) (q0 - q);    covariance = L diag(deviation^2) L' + model_deviation^2 I + G(q)
     /// ```
     ///
@@ -134,33 +135,33 @@ impl FeatureModel {
     #[must_use]
     pub fn expect(
         &self,
-        beliefs: &Beliefs<'_>,
+        priors: &StatePriors<'_>,
         seen: [f64; 4],
         deviation: [f64; 4],
     ) -> Option<Expected> {
         let sensor = Displaced {
             model: self,
-            deviation: beliefs.geometry,
+            deviation: priors.geometry,
         };
         let seen = observed(seen, deviation);
-        let (believed, posture) = sensor.likeliest(beliefs, &seen)?;
-        let there = Belief {
+        let (assumed, posture) = sensor.likeliest(priors, &seen)?;
+        let there = StatePrior {
             state: posture,
-            deviation: beliefs.deviation,
+            deviation: priors.deviation,
         }
-        .prior();
+        .with_geometry();
         let errors = seen.geometry(&sensor, &there)?;
-        let model = self.displaced(&beliefs.geometry, errors);
+        let model = self.displaced(&priors.geometry, errors);
         let columns = SMatrix::<f64, 4, 3>::from(self.predict(posture)?.columns);
         let by_geometry =
-            SMatrix::<f64, 4, ERRORS>::from(self.by_displacement(posture, &beliefs.geometry)?);
-        let own = SMatrix::<f64, 4, 4>::from_diagonal_element(square(beliefs.model_deviation));
+            SMatrix::<f64, 4, ERRORS>::from(self.by_displacement(posture, &priors.geometry)?);
+        let own = SMatrix::<f64, 4, 4>::from_diagonal_element(square(priors.model_deviation));
         let covariance = columns * there.covariance * columns.transpose()
             + by_geometry * by_geometry.transpose()
             + own;
         let [[ua, va], [ub, vb]] = self.bands(posture)?.map(|band| band.centroid);
         let features =
-            SVector::from([ua, va, ub, vb]) + columns * (SVector::from(believed) - there.state);
+            SVector::from([ua, va, ub, vb]) + columns * (SVector::from(assumed) - there.state);
         Some(Expected {
             features: features.into(),
             covariance: covariance.into(),
@@ -174,28 +175,33 @@ impl FeatureModel {
 /// The most probable state and its squared distance.
 fn nearest(
     sensor: &Displaced<'_>,
-    belief: &Belief,
+    prior: &StatePrior,
     seen: &Observed<4>,
 ) -> Option<(PerDof<f64>, f64)> {
-    let found = seen.most_probable(sensor, &belief.prior(), core::iter::empty(), f64::INFINITY)?;
+    let found = seen.most_probable(
+        sensor,
+        &prior.with_geometry(),
+        core::iter::empty(),
+        f64::INFINITY,
+    )?;
     Some((found.state, found.distance_squared))
 }
 
 impl Displaced<'_> {
-    /// A believed state, and the posture to which it leads.
+    /// A state of the prior, and the posture to which it leads.
     fn likeliest(
         &self,
-        beliefs: &Beliefs<'_>,
+        priors: &StatePriors<'_>,
         seen: &Observed<4>,
     ) -> Option<(PerDof<f64>, PerDof<f64>)> {
-        let belief = |state| Belief {
+        let prior = |state| StatePrior {
             state,
-            deviation: beliefs.deviation,
+            deviation: priors.deviation,
         };
         // The states that explain the features best as they are; one of them leads to the best of all.
         let mut starts: [Option<(f64, PerDof<f64>)>; STARTS] = [None; STARTS];
         let mut consider = |state: PerDof<f64>| {
-            let misfit = seen.distance_squared(self, &belief(state).prior());
+            let misfit = seen.distance_squared(self, &prior(state).with_geometry());
             let mut moved = misfit.map(|misfit| (misfit, state));
             for place in &mut starts {
                 if let Some((misfit, _)) = moved
@@ -205,12 +211,12 @@ impl Displaced<'_> {
                 }
             }
         };
-        beliefs.states.iter().copied().for_each(&mut consider);
-        if let [[q1, q2, q3]] = *beliefs.states
+        priors.states.iter().copied().for_each(&mut consider);
+        if let [[q1, q2, q3]] = *priors.states
             && self.model.predict([q1, q2, q3]).is_none()
         {
             // No band can be seen from there; but it need not be exactly there.
-            let [d1, d2, d3] = beliefs.deviation;
+            let [d1, d2, d3] = priors.deviation;
             for side in [-1.0, 1.0] {
                 consider([q1 + side * d1, q2, q3]);
                 consider([q1, q2 + side * d2, q3]);
@@ -218,12 +224,12 @@ impl Displaced<'_> {
             }
         }
         let found = starts.iter().flatten().filter_map(|(_, state)| {
-            let (posture, misfit) = nearest(self, &belief(*state), seen)?;
+            let (posture, misfit) = nearest(self, &prior(*state), seen)?;
             Some((*state, posture, misfit))
         });
-        let (believed, posture, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
-        let anywhere = beliefs.states.len() > 1;
-        Some((if anywhere { posture } else { believed }, posture))
+        let (assumed, posture, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let anywhere = priors.states.len() > 1;
+        Some((if anywhere { posture } else { assumed }, posture))
     }
 }
 
@@ -257,11 +263,11 @@ mod tests {
         };
         for state in [[20e-3, 0.4, 1.2], [30e-3, -1.9, 0.4], [15e-3, 2.0, -0.8]] {
             let seen = actual.predict(state).unwrap().features;
-            let belief = Belief {
+            let prior = StatePrior {
                 state,
                 deviation: [1e-3; 3],
             };
-            let found = observed(seen, [0.3; 4]).geometry(&sensor, &belief.prior());
+            let found = observed(seen, [0.3; 4]).geometry(&sensor, &prior.with_geometry());
             let explained = told.displaced(&sensor.deviation, found.unwrap());
             let away = |model: &FeatureModel| {
                 let found = model.predict(state).unwrap().features;

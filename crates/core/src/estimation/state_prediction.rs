@@ -2,7 +2,7 @@
 
 use crate::dof::zip_with;
 use crate::error::{ConfigError, require_positive};
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::Entry;
 use crate::math::linear::square;
 
@@ -71,23 +71,23 @@ impl<const N: usize> StatePrediction<N> {
     }
 
     /// The prediction at a moment of the history.
-    pub(crate) fn at(&self, past: &Entry<N>) -> Belief<N> {
-        let mut belief = Belief {
+    pub(crate) fn at(&self, past: &Entry<N>) -> StatePrior<N> {
+        let mut prior = StatePrior {
             state: zip_with(past.predicted_state, past.corrected, |q, moved| q - moved),
             deviation: self.start_deviation,
         };
-        let now = belief.state.iter_mut().zip(&mut belief.deviation);
+        let now = prior.state.iter_mut().zip(&mut prior.deviation);
         for (((state, deviation), travel), last) in now.zip(past.travel).zip(self.last) {
             *state += last.correction;
             let moved = travel - last.travel;
             let variance = square(last.deviation) + square(moved);
             *deviation = deviation.min(libm::sqrt(variance));
         }
-        belief
+        prior
     }
 
     /// Makes the prediction `prior` less certain after an image without markers.
-    pub(crate) fn miss(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+    pub(crate) fn miss(&mut self, past: &Entry<N>, prior: &StatePrior<N>) {
         let wider = zip_with(prior.deviation, self.start_deviation, |own, start| {
             own.max((MISS * own).min(MISSED * start))
         });
@@ -95,7 +95,7 @@ impl<const N: usize> StatePrediction<N> {
     }
 
     /// Makes the prediction `prior` as uncertain as at the start.
-    pub(crate) fn reset(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+    pub(crate) fn reset(&mut self, past: &Entry<N>, prior: &StatePrior<N>) {
         self.set(past, prior.state, self.start_deviation, [true; N]);
     }
 

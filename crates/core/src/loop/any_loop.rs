@@ -2,7 +2,7 @@
 
 use crate::article::play::Play;
 use crate::error::{ConfigError, require};
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::Entry;
 use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
@@ -80,7 +80,7 @@ pub trait BandLoop: Loop {
     /// detection, corrected by the last images.
     ///
     /// None beyond the history.
-    fn predict_state(&self, captured_at: f64) -> Option<Belief>;
+    fn predict_state(&self, captured_at: f64) -> Option<StatePrior>;
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
     ///

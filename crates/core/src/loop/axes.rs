@@ -12,12 +12,12 @@ use crate::r#loop::any_loop::{DOFS, Loop, padded};
 use crate::r#loop::best::Best;
 use crate::r#loop::image_update::Outcome;
 use crate::r#loop::measurement::Measurement;
+use crate::r#loop::observation::Observation;
 use crate::r#loop::paper::{Paper, StateEstimation};
 use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
-use crate::r#loop::sight::Sight;
 use crate::supervision::frame_gate::ImageIdentity;
 
 /// Most values of a measurement.
@@ -155,7 +155,7 @@ pub struct View<const N: usize> {
     innovation: [f64; VALUES],
 }
 
-impl<P: SensorProfile<N>, const N: usize> Sight<P, N> for Reading<'_> {
+impl<P: SensorProfile<N>, const N: usize> Observation<P, N> for Reading<'_> {
     type View = View<N>;
 
     const IS_WHOLE: bool = false;
@@ -227,9 +227,9 @@ impl<const N: usize> SensorProfile<N> for Paper<N, StateFromSensor<N>> {
         reading: &Reading<'_>,
         past: &Entry<N>,
     ) -> Option<(Measurement<N, Self::Evidence>, View<N>)> {
-        let belief = self.prior(past);
+        let predicted = self.prior(past);
         let prior = Prior {
-            state: belief.state.into(),
+            state: predicted.state.into(),
             covariance: SMatrix::zeros(),
             geometry: SVector::zeros(),
             slope: SMatrix::zeros(),
@@ -238,16 +238,16 @@ impl<const N: usize> SensorProfile<N> for Paper<N, StateFromSensor<N>> {
         let observed = reading.observed();
         let rows = compressed(observed.linearize(reading, &prior, observed.seen, &[0.0; N])?);
         let observable = determined(&rows.by_state, self.estimation.unit);
-        let (state, std) = least_squares(&rows, belief.state, observable)?;
+        let (state, std) = least_squares(&rows, predicted.state, observable)?;
         let measurement = Measurement {
             state,
             observable,
-            distance: self.distance(past, &belief, state, std, observable),
+            distance: self.distance(past, &predicted, state, std, observable),
             is_partial: reading.is_partial(),
             has_outlier: false,
             evidence: std,
         };
-        let view = reading.view(belief.state, state, std, observable)?;
+        let view = reading.view(predicted.state, state, std, observable)?;
         Some((measurement, view))
     }
 }

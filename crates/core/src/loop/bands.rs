@@ -7,7 +7,7 @@ use crate::article::state::{StateEstimate, found};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::estimate::GeometryPrior;
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{Observed, Sensor};
 use crate::r#loop::best::{Best, ERRORS};
@@ -81,12 +81,12 @@ impl BandProfile for Best {
         &self,
         history: &History<S>,
         past: &Entry,
-    ) -> Belief {
+    ) -> StatePrior {
         let plays = self.plays_at(history, past);
         let mut ahead = self.estimate.clone();
         ahead.advance(plays.travel);
         let prior = ahead.prior(&plays);
-        Belief {
+        StatePrior {
             state: prior.state.into(),
             deviation: prior.covariance.diagonal().map(libm::sqrt).into(),
         }

@@ -3,14 +3,14 @@
 use crate::article::estimator::Triggers;
 use crate::article::state::StateEstimate;
 use crate::dof::zip_with;
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::Entry;
 use crate::r#loop::any_loop::BandLoop;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
+use crate::r#loop::observation::Observation;
 use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{GeometryEstimate, Report, Status};
-use crate::r#loop::sight::Sight;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};
@@ -30,9 +30,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     HysteresisReduction<P, S, V, N>
 {
     /// Update by what one of the sensors saw at `captured_at` in s.
-    pub(super) fn update_by<I: Sight<P, N>>(
+    pub(super) fn update_by<I: Observation<P, N>>(
         &mut self,
-        sight: &I,
+        observation: &I,
         captured_at: f64,
         sensor: usize,
         image: Option<ImageIdentity>,
@@ -45,15 +45,15 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             travel: past.map(|past| past.travel),
         };
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
-        let outcome = self.examine(sight, captured_at, sensor, past, &mut raised);
+        let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);
         let rate = self.monitors.check_rate(captured_at, sensor);
         self.monitors.update(Source::Frame, raised.union(rate));
         outcome
     }
 
-    fn examine<I: Sight<P, N>>(
+    fn examine<I: Observation<P, N>>(
         &mut self,
-        sight: &I,
+        observation: &I,
         captured_at: f64,
         sensor: usize,
         past: Option<Entry<N>>,
@@ -82,13 +82,13 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             return unused(Status::Refused, Some(past));
         }
         self.profile.advance(&self.history, &past);
-        if !sight.is_usable() {
+        if !observation.is_usable() {
             self.profile.miss(&past);
             *raised = self.monitors.enabled(Flags::of(Flag::Lost));
             return unused(Status::NoMarkers, Some(past));
         }
-        let Some((measurement, view)) = sight.measure(&self.profile, &past) else {
-            // The model sees nothing from where the tip is believed to be.
+        let Some((measurement, view)) = observation.measure(&self.profile, &past) else {
+            // The model predicts no features at the predicted state.
             let is_missing = self.is_missing(past.travel, [false; N]);
             let missed = if I::IS_WHOLE {
                 Flags::of(Flag::Lost)
@@ -98,7 +98,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             *raised = self.monitors.enabled(missed);
             return unused(Status::Held, Some(past));
         };
-        *raised = self.check_innovation(sight, &past, measurement.distance, &view);
+        *raised = self.check_innovation(observation, &past, measurement.distance, &view);
         if !raised.is_empty() {
             // Bands that contradict the prediction for as long as a hold lasts are more credible than the prediction.
             if self.monitors.supervision().reaction == Reaction::Fade {
@@ -126,20 +126,20 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 
     /// Flags for which the measurement is refused.
-    fn check_innovation<I: Sight<P, N>>(
+    fn check_innovation<I: Observation<P, N>>(
         &self,
-        sight: &I,
+        observation: &I,
         past: &Entry<N>,
         distance: f64,
         view: &I::View,
     ) -> Flags {
         let flags = self.monitors.check_innovation(distance);
-        let is_exchanged = sight.is_exchanged(view);
+        let is_exchanged = observation.is_exchanged(view);
         if !is_exchanged && flags.is_empty() {
             return Flags::NONE;
         }
         let fits = |distance| self.monitors.check_innovation(distance).is_empty();
-        let is_swapped = is_exchanged || sight.fits_exchanged(&self.profile, past, fits);
+        let is_swapped = is_exchanged || observation.fits_exchanged(&self.profile, past, fits);
         let swapped = self
             .monitors
             .enabled(Flags::when(is_swapped, Flag::Swapped));
@@ -250,7 +250,7 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for Hysteresis
         }
     }
 
-    fn predict_state(&self, captured_at: f64) -> Option<Belief> {
+    fn predict_state(&self, captured_at: f64) -> Option<StatePrior> {
         let past = self.history.at(captured_at)?;
         Some(self.profile.predict(&self.history, &past))
     }
@@ -293,7 +293,7 @@ struct Bands<'a> {
     image: Option<Image<'a>>,
 }
 
-impl<P: BandProfile> Sight<P, 3> for Bands<'_> {
+impl<P: BandProfile> Observation<P, 3> for Bands<'_> {
     type View = BandsView;
 
     fn is_usable(&self) -> bool {

@@ -9,7 +9,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::article::state::{StateEstimator, found};
 use crate::dof::{PerDof, try_each, zip_with};
 use crate::error::ConfigError;
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::state_prediction::{StatePrediction, step_deviation};
 use crate::r#loop::measurement::Measurement;
@@ -159,7 +159,11 @@ impl BandProfile for Paper {
         Self::with_estimation(&settings.dofs, limits, estimation)
     }
 
-    fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
+    fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &self,
+        _: &History<S>,
+        past: &Entry,
+    ) -> StatePrior {
         self.prior(past)
     }
 
@@ -203,11 +207,11 @@ impl BandProfile for Paper {
 
 impl<const N: usize, E: StateEstimation<N>> Paper<N, E> {
     /// The state prediction at a moment of the history.
-    pub(super) fn prior(&self, past: &Entry<N>) -> Belief<N> {
-        let belief = self.prediction.at(past);
-        Belief {
-            state: E::named(past.predicted_state, belief.state),
-            ..belief
+    pub(super) fn prior(&self, past: &Entry<N>) -> StatePrior<N> {
+        let prior = self.prediction.at(past);
+        StatePrior {
+            state: E::named(past.predicted_state, prior.state),
+            ..prior
         }
     }
 
@@ -216,7 +220,7 @@ impl<const N: usize, E: StateEstimation<N>> Paper<N, E> {
     pub(super) fn distance(
         &self,
         past: &Entry<N>,
-        prior: &Belief<N>,
+        prior: &StatePrior<N>,
         state: [f64; N],
         std: [f64; N],
         observable: [bool; N],

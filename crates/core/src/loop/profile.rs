@@ -6,7 +6,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::expectation::Belief;
+use crate::estimation::expectation::StatePrior;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::report::{GeometryEstimate, SlackEstimate};
@@ -128,7 +128,7 @@ pub trait BandProfile: Profile {
         &self,
         history: &History<S>,
         past: &Entry,
-    ) -> Belief;
+    ) -> StatePrior;
 
     /// The state estimate from an image of that time; None where a band is not visible.
     fn measure(

@@ -1,6 +1,6 @@
 //! Prediction of the bands in an image from a state prediction, with its covariance.
 
-use crate::estimation::expectation::Beliefs;
+use crate::estimation::expectation::StatePriors;
 use crate::model::camera::{Camera, Pose};
 use crate::model::features::FeatureModel;
 use crate::model::geometry_error::GeometryDeviation;
@@ -24,8 +24,8 @@ fn states() -> impl Strategy<Value = [f64; 3]> {
     (15e-3..35e-3, -1.5..1.5, 0.1..1.2).prop_map(|(q1, q2, q3)| [q1, q2, q3])
 }
 
-fn beliefs(states: &[[f64; 3]], model_deviation: f64) -> Beliefs<'_> {
-    Beliefs {
+fn priors(states: &[[f64; 3]], model_deviation: f64) -> StatePriors<'_> {
+    StatePriors {
         states,
         deviation: DEVIATION,
         model_deviation,
@@ -38,7 +38,7 @@ proptest! {
 
     #[test]
     fn before_an_image_the_bands_are_where_the_belief_has_them(state in states()) {
-        let expected = model().expect(&beliefs(&[state], 2.5), [0.0; 4], UNSEEN);
+        let expected = model().expect(&priors(&[state], 2.5), [0.0; 4], UNSEEN);
         let (expected, bands) = (expected.unwrap(), model().bands(state).unwrap());
         prop_assert_eq!(expected.bands, bands);
         let [[ua, va], [ub, vb]] = bands.map(|band| band.centroid);
@@ -48,7 +48,7 @@ proptest! {
     #[test]
     fn as_sure_as_states_drawn_from_the_belief_are_alike(state in states(), direction in prop::array::uniform4(-1.0..1.0)) {
         // Along any direction: the spread of a linear function of independent DOFs, by differences.
-        let expected = model().expect(&beliefs(&[state], 1e-9), [0.0; 4], UNSEEN).unwrap();
+        let expected = model().expect(&priors(&[state], 1e-9), [0.0; 4], UNSEEN).unwrap();
         let along = |state| -> f64 {
             let features = model().predict(state).unwrap().features;
             features.iter().zip(direction).map(|(feature, by)| feature * by).sum()
@@ -74,7 +74,7 @@ proptest! {
         prop_assume!((state[1] - other[1]).abs() > 0.5);
         prop_assume!([state, other].into_iter().all(|state| model().bands(state).is_some()));
         let seen = model().predict(state).unwrap().features;
-        let expected = model().expect(&beliefs(&[other, state], 2.5), seen, [0.1; 4]).unwrap();
+        let expected = model().expect(&priors(&[other, state], 2.5), seen, [0.1; 4]).unwrap();
         for (found, band) in expected.bands.iter().zip(model().bands(state).unwrap()) {
             let [du, dv] = [0, 1].map(|axis| found.centroid[axis] - band.centroid[axis]);
             prop_assert!(du.hypot(dv) < 0.5, "{} {}", du, dv);

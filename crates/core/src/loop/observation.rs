@@ -1,21 +1,21 @@
-//! What a sensor saw, for a profile.
+//! Output of a sensor at one time, for a profile.
 
 use crate::estimation::history::Entry;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::profile::Profile;
 
-/// What a sensor saw at one time, before a profile has looked at it.
-pub(crate) trait Sight<P: Profile<N>, const N: usize> {
+/// Output of a sensor at one time, from which a profile makes its measurement.
+pub(crate) trait Observation<P: Profile<N>, const N: usize> {
     /// What a report says of it.
     type View: Copy;
 
     /// Whether each measurement is to be complete; else several sensors may share the DOFs.
     const IS_WHOLE: bool = true;
 
-    /// Whether anything was seen.
+    /// Whether it has any feature or value.
     fn is_usable(&self) -> bool;
 
-    /// The measurement; None where the model of the sensor sees nothing.
+    /// The measurement; None where the model of the sensor predicts no features.
     fn measure(
         &self,
         profile: &P,
