@@ -1,7 +1,7 @@
 """Tracking error over two hours of strokes shorter and longer than the slack, and of rests.
 
 On ideal plays, on the twin, and on the twin with faults of the images. Every tenth of a
-run is judged by itself. `--write` updates docs/soak.md.
+run is judged by itself. `--write` updates the tables of these plants in docs/soak.md.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
     options = parser.parse_args()
     if options.write and (options.stroke or options.motion):
-        parser.error("--write updates the whole table: use it without a selection of cases")
+        parser.error(
+            "--write updates whole tables: use it without a selection of strokes or motions"
+        )
     return options
 
 
@@ -85,8 +87,10 @@ def main() -> None:
     if options.write:
         last = options.first_seed + options.seeds - 1
         seeds = f"{options.first_seed}" if options.seeds == 1 else f"{options.first_seed} to {last}"
-        text = f"Seed {seeds}, {options.seconds:g} s; errors are RMS, per DOF.\n\n{shown}"
-        insert(PAGE, "soak", text)
+        for plant in dict.fromkeys(case.plant for case in found):
+            shown = table({case: each for case, each in found.items() if case.plant == plant})
+            text = f"Seed {seeds}, {options.seconds:g} s; errors are RMS, per DOF.\n\n{shown}"
+            insert(PAGE, f"soak {plant}", text)
 
 
 if __name__ == "__main__":

@@ -160,6 +160,7 @@ def test_intervals_are_compared_with_the_truth_of_the_plays() -> None:
     assert coverage.shares() == {"width": [0.5] * 3, "gain": [1.0, 0.75, 1.0]}
 
 
-def test_the_page_has_a_section_for_the_table() -> None:
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_page_has_a_section_for_the_table_of(plant: str) -> None:
     page = (ROOT / "docs" / "soak.md").read_text(encoding="utf-8")
-    assert page.index("<!-- soak: begin -->") < page.index("<!-- soak: end -->")
+    assert page.index(f"<!-- soak {plant}: begin -->") < page.index(f"<!-- soak {plant}: end -->")
