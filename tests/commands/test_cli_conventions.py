@@ -13,11 +13,15 @@ import sys
 import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from common.paths import ROOT
 from refused import failed
 from tautscope.cli import _parser, main
+from tautscope.commands.bench import _check_faults
+from tautscope.commands.printing import announce
 from tautscope.errors import (
     BusError,
     CameraError,
@@ -25,6 +29,7 @@ from tautscope.errors import (
     DriveError,
     MissingExtraError,
     MotionHeldError,
+    OutputError,
 )
 from tautscope.extras import MODULES, require_extras
 
@@ -207,6 +212,31 @@ def test_a_run_without_consent_or_room_for_its_log_opens_no_rig(
     assert list(tmp_path.iterdir()) == []
     if not has_room:  # consent is no room
         assert main(["run", *config, *rig, *out, "--yes"]) == 2
+
+
+def test_the_room_in_a_mounted_folder_is_that_of_its_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Path] = []
+
+    def usage(path: Path) -> SimpleNamespace:
+        asked.append(path)
+        return SimpleNamespace(free=2e9)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    announce("a run", 1.0, 1e9, tmp_path)
+    announce("a run", 1.0, 1e9, tmp_path / "new" / "folder")
+    assert asked == [tmp_path, tmp_path]
+    with pytest.raises(OutputError, match=f"{tmp_path} with 2 GB free"):
+        announce("a run", 1.0, 3e9, tmp_path)
+
+
+@pytest.mark.parametrize("fault", ["clear", "clear nothing", "drop", "drop nothing", "no camera"])
+def test_a_bench_refuses_a_fault_that_it_has_not(fault: str) -> None:
+    bench: Any = SimpleNamespace(drives=SimpleNamespace(kinds=("drop",)))
+    _check_faults(bench, [(1.0, "drop rotation"), (2.0, "clear camera")])
+    with pytest.raises(ConfigError, match=re.escape(f"--faults: got '{fault}'")):
+        _check_faults(bench, [(1.0, fault)])
 
 
 def test_verbose_prints_the_log(capsys: Capture, tmp_path: Path) -> None:
