@@ -23,6 +23,7 @@ from tautscope.cli import _parser, main
 from tautscope.commands.bench import _check_faults
 from tautscope.commands.printing import announce
 from tautscope.errors import (
+    EMERGENCY_STOP,
     BusError,
     CameraError,
     ConfigError,
@@ -158,6 +159,22 @@ def test_an_interruption_says_what_was_written(
     monkeypatch.setattr("tautscope.commands.config.load_config", stop)
     assert main(["config"]) == 130
     assert capsys.readouterr().err == "interrupted\nThe log of the run is run.mcap\n"
+
+
+@pytest.mark.parametrize("note", ["The log is run.mcap", f"{EMERGENCY_STOP}: it may be moving"])
+def test_an_interrupted_run_says_that_the_motors_are_stopped_only_if_they_are(
+    note: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        error = KeyboardInterrupt()
+        error.add_note(note)
+        raise error
+
+    monkeypatch.setattr("tautscope.hardware.experiment.run_on_hardware", stop)
+    assert main(["run", "--config", "bench", "--yes", "--out", str(tmp_path / "run")]) == 130
+    found = capsys.readouterr().err
+    assert note in found
+    assert ("The motors are stopped" in found) == (EMERGENCY_STOP not in note)
 
 
 def test_a_rig_with_placeholders_is_refused_by_name(capsys: Capture, tmp_path: Path) -> None:
