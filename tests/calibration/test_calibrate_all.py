@@ -45,7 +45,9 @@ class Steps:
         def run(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
             self.seen.append((name, config.camera.fx))
             if name in self.failing:
-                raise CalibrationError(f"{name} failed", "Try again")
+                error = CalibrationError(f"{name} failed", "Try again")
+                error.add_note("A motor may still move")
+                raise error
             figure = Figure()
             figure.subplots().plot([0, 1])
             if name == "motion":
@@ -133,6 +135,15 @@ def test_the_terminal_answers_while_the_camera_has_the_input(
     monkeypatch.setattr(question, "TERMINAL", terminal)
     assert main([*COMMAND, "--out", "b"]) == 0
     assert len(steps.seen) == 3
+
+
+def test_a_step_that_fails_says_all_before_it_asks_again(
+    steps: Steps, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps.failing = {"camera"}
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\nq\n"))
+    assert main([*COMMAND, "--out", "out"]) == 1
+    assert "camera failed. Try again; A motor may still move" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("steps")

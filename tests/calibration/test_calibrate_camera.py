@@ -92,6 +92,9 @@ def test_a_ros_file_becomes_a_section(capsys: Capture, tmp_path: Path, files: li
     imported = tomllib.loads(capsys.readouterr().out)["camera"]
     assert imported["distortion"] == pytest.approx(fitted["distortion"], rel=1e-3, abs=1e-3)
     assert imported["distortion"][5] != 0
+    copy = tmp_path / "copy.yaml"
+    assert main([*COMMAND, str(ros), "--ros", str(copy)]) == 0
+    assert read_camera_info(copy) == read_camera_info(ros)
 
 
 def test_the_board_has_true_scale(capsys: Capture, tmp_path: Path) -> None:

@@ -13,18 +13,24 @@ import sys
 import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from common.paths import ROOT
 from refused import failed
 from tautscope.cli import _parser, main
+from tautscope.commands.bench import _check_faults
+from tautscope.commands.printing import announce
 from tautscope.errors import (
+    EMERGENCY_STOP,
     BusError,
     CameraError,
     ConfigError,
     DriveError,
     MissingExtraError,
     MotionHeldError,
+    OutputError,
 )
 from tautscope.extras import MODULES, require_extras
 
@@ -155,6 +161,22 @@ def test_an_interruption_says_what_was_written(
     assert capsys.readouterr().err == "interrupted\nThe log of the run is run.mcap\n"
 
 
+@pytest.mark.parametrize("note", ["The log is run.mcap", f"{EMERGENCY_STOP}: it may be moving"])
+def test_an_interrupted_run_says_that_the_motors_are_stopped_only_if_they_are(
+    note: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        error = KeyboardInterrupt()
+        error.add_note(note)
+        raise error
+
+    monkeypatch.setattr("tautscope.hardware.experiment.run_on_hardware", stop)
+    assert main(["run", "--config", "bench", "--yes", "--out", str(tmp_path / "run")]) == 130
+    found = capsys.readouterr().err
+    assert note in found
+    assert ("The motors are stopped" in found) == (EMERGENCY_STOP not in note)
+
+
 def test_a_rig_with_placeholders_is_refused_by_name(capsys: Capture, tmp_path: Path) -> None:
     err = failed(capsys, "run", "--config", "article_rig", "--out", str(tmp_path / "run"))
     assert "drives.insertion.counts_per_unit, drives.insertion.sign" in err
@@ -207,6 +229,31 @@ def test_a_run_without_consent_or_room_for_its_log_opens_no_rig(
     assert list(tmp_path.iterdir()) == []
     if not has_room:  # consent is no room
         assert main(["run", *config, *rig, *out, "--yes"]) == 2
+
+
+def test_the_room_in_a_mounted_folder_is_that_of_its_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Path] = []
+
+    def usage(path: Path) -> SimpleNamespace:
+        asked.append(path)
+        return SimpleNamespace(free=2e9)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    announce("a run", 1.0, 1e9, tmp_path)
+    announce("a run", 1.0, 1e9, tmp_path / "new" / "folder")
+    assert asked == [tmp_path, tmp_path]
+    with pytest.raises(OutputError, match=f"{tmp_path} with 2 GB free"):
+        announce("a run", 1.0, 3e9, tmp_path)
+
+
+@pytest.mark.parametrize("fault", ["clear", "clear nothing", "drop", "drop nothing", "no camera"])
+def test_a_bench_refuses_a_fault_that_it_has_not(fault: str) -> None:
+    bench: Any = SimpleNamespace(drives=SimpleNamespace(kinds=("drop",)))
+    _check_faults(bench, [(1.0, "drop rotation"), (2.0, "clear camera")])
+    with pytest.raises(ConfigError, match=re.escape(f"--faults: got '{fault}'")):
+        _check_faults(bench, [(1.0, fault)])
 
 
 def test_verbose_prints_the_log(capsys: Capture, tmp_path: Path) -> None:

@@ -66,6 +66,23 @@ def test_updates_are_recorded_at_the_time_of_their_measurement() -> None:
     assert np.sqrt(np.mean(moved**2)) < 0.02 * np.ptp(frames["true_axis_1"])
 
 
+def test_a_rig_of_another_period_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    class SlowRig(PlayRig):
+        closed = 0
+
+        def __init__(self, config: Config) -> None:
+            super().__init__(config)
+            self.control_period *= 2
+
+        def close(self) -> None:
+            SlowRig.closed += 1
+
+    monkeypatch.setattr("tautscope.SlowRig", SlowRig, raising=False)
+    with pytest.raises(ConfigError, match=r"control\.period.*that of the rig, 0\.01 s"):
+        rig_maker("tautscope:SlowRig")(axes(1, width_limit=1.0))
+    assert SlowRig.closed == 1
+
+
 def test_a_configuration_alone_is_a_rig() -> None:
     config = load_config("colonoscope")
     rig = rig_maker("tautscope:PlayRig")(config)

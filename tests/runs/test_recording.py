@@ -135,8 +135,13 @@ def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) ->
         Recording.load(tmp_path)
     folder = tmp_path / "run"
     compensated.save(folder)
-    trace = folder / "trace.csv"
+    trace, frames = folder / "trace.csv", folder / "frames.csv"
     whole = trace.read_text()
+    header, row, *rows = frames.read_text().splitlines()
+    cells = dict(zip(header.split(","), row.split(","), strict=True)) | {"sequence": "9" * 20}
+    frames.write_text("\n".join([header, ",".join(cells.values()), *rows]))
+    with pytest.raises(RecordError, match=r"frames\.csv"):
+        Recording.load(folder)
     trace.write_text(whole.replace("reference_insertion", "u", 1))
     with pytest.raises(RecordError, match=r"trace\.csv.*expected the columns time"):
         Recording.load(folder)

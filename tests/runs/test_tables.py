@@ -120,6 +120,32 @@ def test_a_tip_of_another_file_keeps_its_time(kind: str, tmp_path: Path) -> None
     np.testing.assert_allclose(found.command[seen], found.measured[seen], atol=1e-5)
 
 
+@pytest.mark.parametrize("title", ["time [ms]", "timestamp_ns"])
+def test_dates_count_in_seconds_whatever_their_title_says(title: str, tmp_path: Path) -> None:
+    stamps = [datetime(2026, 11, 22, 0, 0, k) for k in range(3)]
+    file = tmp_path / "log.parquet"
+    positions = {"insertion": [0.01] * 3, "rotation": [0.0] * 3, "bending": [0.0] * 3}
+    pl.DataFrame({title: stamps, "motor": [1.0, 2.0, 4.0], "tip": [1.0, 2.0, 4.0]}).write_parquet(
+        file
+    )
+    found = read_record(file, "motor", "tip", title)
+    assert found.time is not None
+    np.testing.assert_array_equal(found.time, [0, 1, 2])
+    pl.DataFrame({"time_ms": stamps} | positions).write_parquet(file)
+    np.testing.assert_array_equal(read_motors(file)[0], [0, 1, 2])
+
+
+def test_tips_that_are_too_few_or_at_other_times_are_named_by_their_file(tmp_path: Path) -> None:
+    motor, tip = tmp_path / "motor.csv", tmp_path / "tip.csv"
+    motor.write_text("time,motor\n" + "".join(f"{k},{k}\n" for k in range(9)))
+    tip.write_text("time,tip\n1,1\n2,\n")
+    with pytest.raises(RecordError, match=r"tip\.csv, column tip: got '1 samples'"):
+        read_record(motor, "motor", "tip", "time", tip_path=tip)
+    tip.write_text("time,tip\n" + "".join(f"{100 + k},{k}\n" for k in range(9)))
+    with pytest.raises(RecordError, match=r"tip\.csv, column tip: got '0 samples'.*one clock"):
+        read_record(motor, "motor", "tip", "time", tip_path=tip)
+
+
 def test_a_column_without_a_time_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("time,motor,tip\n,1,2\n,2,3\n")

@@ -6,7 +6,6 @@ import argparse
 import os
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from tautscope.commands import arguments
@@ -73,7 +72,7 @@ def analyze_episodes(
             more = shlex.join([*words, "--command", command, "--measured", tip])
             text += f" A compensator, from the episode with the median: {more}"
         screen.print(f"{text}\n", soft_wrap=True)
-    screen.print(f"All episodes: {folder / 'episodes.csv'}, {Path('episodes.png')}", soft_wrap=True)
+    screen.print(f"All episodes: {folder / 'episodes.csv'}, episodes.png", soft_wrap=True)
 
 
 def _text(found: dict[str, Any], count: int) -> str:

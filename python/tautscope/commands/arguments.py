@@ -138,32 +138,25 @@ def _integer(text: str, least: int) -> int:
 
 def above_zero(text: str) -> float:
     """A finite number above 0."""
-    value = _number(text)
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number above 0")
-    return value
+    return _number(text, "a number above 0", lambda value: value > 0)
 
 
 def not_zero(text: str) -> float:
     """A finite number other than 0."""
-    value = _number(text)
-    if math.isnan(value) or value == 0:
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number other than 0")
-    return value
+    return _number(text, "a number other than 0", lambda value: value != 0)
 
 
 def seconds(text: str) -> float:
     """A finite number."""
-    value = _number(text)
-    if math.isnan(value):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds")
-    return value
+    return _number(text, "a number of seconds", math.isfinite)
 
 
-def _number(text: str) -> float:
-    """The finite number in a text, or NaN."""
+def _number(text: str, expected: str, is_allowed: Callable[[float], bool]) -> float:
+    """The finite number in a text, if it is allowed."""
     try:
         value = float(text)
     except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
+        value = math.nan
+    if not (math.isfinite(value) and is_allowed(value)):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected {expected}")
+    return value

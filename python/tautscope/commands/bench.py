@@ -132,7 +132,7 @@ def _check_faults(bench: Bench, faults: Iterable[tuple[float, str]]) -> None:
     kinds = dict.fromkeys((dof.label for dof in Dof), bench.drives.kinds) | {"camera": FAULTS}
     for _, request in faults:
         kind, _, part = request.partition(" ")
-        if kind not in ("clear", *kinds.get(part, ())):
+        if part not in kinds or kind not in ("clear", *kinds[part]):
             allowed = "; ".join(f"{', '.join(kinds[each])} of {each}" for each in kinds)
             raise ConfigError("--faults", request, f"KIND PART, with {allowed}; or clear PART")
 

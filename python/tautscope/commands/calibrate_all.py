@@ -15,7 +15,7 @@ from tautscope.commands.calibration_session import CalibrationSession
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.config import Config
-from tautscope.errors import TautscopeError
+from tautscope.errors import TautscopeError, described
 from tautscope.runs.output_folder import check_free, default_folder
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) ->
         except TautscopeError as error:
             if options.yes or options.twin:
                 raise
-            _say(f"error: {error}")
+            _say(f"error: {described(error)}")
     session.finish_step(step.name, result)
     for note in result.notes if result is not None else ("skipped",):
         _say(f"  {note}")

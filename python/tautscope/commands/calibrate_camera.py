@@ -15,7 +15,7 @@ from tautscope.commands.calibration_output import add_options, check_options, fi
 from tautscope.commands.calibration_rig import add_twin, twin_seed
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
-from tautscope.runs.output_folder import check_free_file
+from tautscope.runs.output_folder import check_free_file, new_file
 
 if TYPE_CHECKING:
     from tautscope.calibration.camera.board import Board
@@ -96,14 +96,15 @@ def _run(options: argparse.Namespace) -> None:
     if options.ros is not None:
         check_free_file(options.ros)
     if len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml"):
-        finish(options, _import(options.files[0]))
-        return
-    if options.files and options.twin:
+        result, info = _import(options.files[0])
+    elif options.files and options.twin:
         raise FieldError("--twin", True, "files or --twin, not both")
-    result, info = calibrate(options, options.files)
-    if options.ros is not None:
-        options.ros.write_text(info, encoding="utf-8")
+    else:
+        result, info = calibrate(options, options.files)
     finish(options, result)
+    if options.ros is not None:  # what is printed already is not lost by an error
+        with new_file(options.ros) as partial:
+            partial.write_text(info, encoding="utf-8")
 
 
 def calibrate(
@@ -148,10 +149,15 @@ def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
     return live_images(config, options.seconds)
 
 
-def _import(file: Path) -> CalibrationResult:
-    """The camera of a ROS camera_info file."""
-    from tautscope.calibration.camera.camera_info import read_camera_info  # noqa: PLC0415
+def _import(file: Path) -> tuple[CalibrationResult, str]:
+    """As `calibrate`, of a ROS camera_info file."""
+    from tautscope.calibration.camera.camera_info import (  # noqa: PLC0415
+        camera_info,
+        read_camera_info,
+    )
     from tautscope.calibration.camera.result import camera_values  # noqa: PLC0415
 
-    values, notes = camera_values(read_camera_info(file))
-    return CalibrationResult("camera", values, notes=(f"from {file}", *notes))
+    camera = read_camera_info(file)
+    values, notes = camera_values(camera)
+    result = CalibrationResult("camera", values, notes=(f"from {file}", *notes))
+    return result, camera_info(camera)

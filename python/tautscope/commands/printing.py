@@ -38,7 +38,8 @@ def announce(what: str, seconds: float, size: float, folder: Path) -> None:
     Raises:
         OutputError: The disk has no room for the files.
     """
-    above = next(each for each in folder.absolute().parents if each.exists())
+    path = folder.absolute()
+    above = next(each for each in (path, *path.parents) if each.exists())  # it may be a mount point
     free = shutil.disk_usage(above).free
     duration = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
     unit, scale = ("MB", 1e6) if size < 1e9 else ("GB", 1e9)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tautscope.config.axes import DofEntry, Name
 from tautscope.config.drives import DrivesConfig
@@ -101,7 +101,7 @@ def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry]) -> Non
 
 def scaled_matrix(
     actuators: ActuatorsConfig, dofs: Sequence[DofEntry]
-) -> tuple[np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.float64]]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The matrix (m, n) in units of width_limit, each row of length 1, and those lengths (m,).
 
     Units differ from motor to motor; neither the rank nor a least-squares solution may depend on

@@ -18,7 +18,7 @@ from tautscope.config.control import DofConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.fields import MOST_RATIO
 from tautscope.config.safety import SafetyConfig
-from tautscope.config.section import require, require_names
+from tautscope.config.section import require, require_defaults, require_names
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
@@ -80,10 +80,7 @@ def check_axes(
     for index, dof in enumerate(dofs):
         names = [other.name for other in dofs[:index]]
         require(dof.name not in names, f"dof[{index}].name", dof.name, "a name used once")
-    for name in _OF_THE_ARTICLE:
-        value = getattr(safety, name)
-        default = getattr(SafetyConfig(), name)
-        require(value == default, f"safety.{name}", value, "its default: [[dof]] has its own")
+    require_defaults(safety, "safety", _OF_THE_ARTICLE, "[[dof]] has its own")
 
 
 _TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")

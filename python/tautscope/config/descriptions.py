@@ -22,7 +22,7 @@ import msgspec.inspect
 
 from tautscope.config.ranges import allowed_values
 from tautscope.config.root import Config
-from tautscope.config.section import Section
+from tautscope.config.section import Section, default_of
 
 _UNIT = re.compile(
     r"\[((?:in )?(?:m|rad|s|half|px|N|bit|grey|share|shares|1|standard|update_distance|width_limit|"
@@ -76,17 +76,15 @@ def keys(section: type[Section]) -> Iterator[Key]:
         kind = msgspec.inspect.type_info(field.type)
         text = texts.get(field.name, "")
         unit = _UNIT.search(text)
-        is_required = field.default is msgspec.NODEFAULT is field.default_factory
-        default = field.default
-        if default is msgspec.NODEFAULT:
-            default = None if is_required else field.default_factory()
+        default = default_of(field)
+        is_required = default is msgspec.NODEFAULT
         found.append(
             Key(
                 field.name,
                 _plain(text),
                 "" if unit is None else _plain(unit[1]),
                 allowed_values(kind),
-                default,
+                None if is_required else default,
                 is_required,
                 _section(hints[field.name]),
                 get_origin(hints[field.name]) is tuple,

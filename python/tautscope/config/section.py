@@ -127,9 +127,8 @@ def _config_error(
         return ConfigError(_joined(prefix, path, cause.field), cause.value, cause.allowed)
     unknown = re.search(r"unknown field `([^`]*)`", expected)
     missing = re.search(r"missing required field `([^`]*)`", expected)
-    for match in (unknown, missing):
-        if match:
-            path = _joined(path, match[1])
+    if match := unknown or missing:
+        path = _joined(path, match[1])
     value: Any = document
     keys = re.findall(r"[^.\[\]]+", path)
     for key in keys:

@@ -140,10 +140,9 @@ def _reader(types: Typestore, kind: str) -> Callable[[Any], Iterator[Part]] | No
 
 
 def _paths(types: Typestore, kind: str) -> list[tuple[str, bool]]:
-    """Paths of the numbers of a type, and whether they are arrays; none if it has blocks of bytes.
+    """Paths of the numbers of a type, and whether they are arrays.
 
-    Raises:
-        KeyError: The type of a field is not known.
+    There are none if the type is not known, or has blocks of bytes.
     """
     from rosbags.interfaces import Nodetype  # noqa: PLC0415  an extra
 

@@ -25,11 +25,11 @@ _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 
 def numbers(
     series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]
-) -> tuple[Floats, int]:
+) -> tuple[Floats, int | None]:
     """A column as numbers; dates and times of day become seconds since the first one.
 
     Returns:
-        Numbers, and the date or time of day [ns] from which they count, 0 where they are none.
+        Numbers, and the date or time of day [ns] from which they count; None of other columns.
     """
     import polars as pl  # noqa: PLC0415
 
@@ -52,7 +52,7 @@ def numbers(
         where = f"{file}, {line} {rows[index]}, column {name}"
         raise RecordError(where, text[index], _ALLOWED)
     found = values.fill_null(float("nan")).to_numpy().astype(np.float64)
-    return np.where(np.abs(found) < 1 / LARGEST, 0.0, found), 0
+    return np.where(np.abs(found) < 1 / LARGEST, 0.0, found), None
 
 
 def _is_too_large(values: pl.Series) -> pl.Series:

@@ -258,6 +258,6 @@ def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
         for name, column in zip(names, columns, strict=True):
             is_flag = dtype[name].kind == "b"
             table[name] = [cell == "True" for cell in column] if is_flag else column
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise RecordError(str(path), str(error), "a number in every cell") from None
     return table

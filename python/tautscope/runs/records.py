@@ -117,7 +117,7 @@ def read_record(
         RecordError: A column is missing, a cell is not a number, or fewer than two samples have a
             tip; the error names file, line and column.
     """
-    sheet = path if isinstance(path, Sheet) else open_table(path)
+    tips = sheet = path if isinstance(path, Sheet) else open_table(path)
     if tip_path is None:
         table, rows, units, _ = _read(sheet, (command, measured), time)
     else:
@@ -146,11 +146,18 @@ def read_record(
         else (np.isnan(table[:, 2]) | np.isnan(table[:, :2]).all(axis=1))
     )
     table, rows = table[~is_blank], rows[~is_blank]
-    for column, name in enumerate((command, measured)):
-        count = int(np.count_nonzero(np.isfinite(table[:, column])))
-        if count < 2:
-            raise RecordError(f"{sheet.file}, column {name}", f"{count} samples", "at least 2")
-    return replace(_clean(table, rows, int(np.count_nonzero(is_blank))), units=(units[0], units[1]))
+    for column, (source, name) in enumerate(((sheet, command), (tips, measured))):
+        _check_count(source, name, table[:, column], "at least 2")
+    record = _clean(table, rows, int(np.count_nonzero(is_blank)))
+    allowed = "at least 2 at times at which the command is known: a time of one clock"
+    _check_count(tips, measured, record.measured, allowed)
+    return replace(record, units=(units[0], units[1]))
+
+
+def _check_count(sheet: Sheet, name: str, values: Floats, allowed: str) -> None:
+    count = int(np.count_nonzero(np.isfinite(values)))
+    if count < 2:
+        raise RecordError(f"{sheet.file}, column {name}", f"{count} samples", allowed)
 
 
 def _read(

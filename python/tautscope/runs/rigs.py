@@ -48,6 +48,7 @@ def rig_maker(name: str, **arguments: Any) -> Callable[[Config], Rig]:
             raise ConfigError(field, name, f"a rig with {', '.join(missing)}: tautscope.Rig")
         period = config.control.period
         if not math.isclose(rig.control_period, period, rel_tol=1e-6):
+            rig.close()
             allowed = f"that of the rig, {rig.control_period:g} s"
             raise ConfigError("control.period", period, allowed)
         return with_actuators(rig, config)

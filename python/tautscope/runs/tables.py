@@ -40,7 +40,8 @@ class Table:
     Attributes:
         columns: Name as asked for -> (n,) values; NaN where there is none. Times of day and dates
             are seconds since the first one.
-        units: Name as asked for -> unit of the header or the line of units, if there is one.
+        units: Name as asked for -> unit of the header or the line of units, if there is one; s of
+            times of day and dates.
         starts: Name as asked for -> the first date or time of day [ns]; 0 of other columns.
         rows: (n,) line of a CSV file, from 1 on; of other files the row, from 1 on.
     """
@@ -82,8 +83,9 @@ class Sheet:
             index = self.index(name)
             title = self.titles[index]
             check_unit(f"{self.file}, column {title}", title)
-            columns[name], starts[name] = self.values(index, name)
-            if unit := self.unit(index):
+            columns[name], start = self.values(index, name)
+            starts[name] = start or 0
+            if unit := self.unit(index) if start is None else "s":
                 units[name] = unit
         if not self.is_merged:
             return Table(columns, units, starts, self.rows)
@@ -93,7 +95,7 @@ class Sheet:
         kept = {name: values[is_own] for name, values in columns.items()}
         return Table(kept, units, starts, self.rows[is_own])
 
-    def values(self, index: int, name: str) -> tuple[Floats, int]:
+    def values(self, index: int, name: str) -> tuple[Floats, int | None]:
         """(n,) numbers of a column, and the date or time of day [ns] from which they count."""
         return numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
 
