@@ -52,9 +52,7 @@ def test_camera_connected_later_is_found(tmp_path: Path) -> None:
     """A file that does not exist yet simulates an unplugged camera."""
     path = tmp_path / "late.avi"
     config = CameraConfig(
-        source=SourceConfig(
-            url=str(path), format=None, reconnect_period=0.01, start_timeout=TIMEOUT
-        )
+        source=SourceConfig(url=str(path), format="", reconnect_period=0.01, start_timeout=TIMEOUT)
     )
     live = Camera(config)
 

@@ -145,6 +145,12 @@ def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) ->
     trace.write_text(whole.replace("reference_insertion", "u", 1))
     with pytest.raises(RecordError, match=r"trace\.csv.*expected the columns time"):
         Recording.load(folder)
+    facts = folder / "recording.toml"
+    known = facts.read_text()
+    facts.write_text(known.replace("compensated = true", 'compensated = "false"'))
+    with pytest.raises(RecordError, match="compensated is true or false, not 'false'"):
+        Recording.load(folder)
+    facts.write_text(known)
     trace.write_text(whole[: len(whole) // 2].rsplit(",", 3)[0])
     with pytest.raises(RecordError, match=r"trace\.csv"):
         Recording.load(folder)

@@ -30,8 +30,8 @@ class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     url: str = "/dev/video0"
     """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph of lavfi."""
-    format: str | None = "v4l2"
-    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; None lets it detect the format."""
+    format: str = "v4l2"
+    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; "" lets it detect the format."""
     options: dict[str, str] = field(default_factory=dict)
     """FFmpeg's options: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"

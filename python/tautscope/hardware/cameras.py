@@ -149,7 +149,9 @@ class Camera:
             is_permanent = False
             try:
                 options = _LIVE | source.options
-                with open_source(source.url, source.format, options, source.timeout) as container:
+                with open_source(
+                    source.url, source.format or None, options, source.timeout
+                ) as container:
                     self._read(Decoder(container, self._config))
                 trouble = f"{source.url} has ended and is opened again"
             except CameraError as error:

@@ -214,7 +214,10 @@ def read_run_facts(text: str, config: Config) -> tuple[bool, tuple[Segment, ...]
         if not all(isinstance(each, int | float) for each in numbers):
             raise TypeError(f"start, period and periods are numbers, not {numbers}")
         segments.append(Segment(dofs[item["dof"]], *numbers))
-    return bool(facts["compensated"]), tuple(segments)
+    compensated = facts["compensated"]
+    if not isinstance(compensated, bool):
+        raise TypeError(f"compensated is true or false, not {compensated!r}")
+    return compensated, tuple(segments)
 
 
 def per_dof(table: Table, group: str, dofs: Iterable[NamedDof] = Dof) -> Floats:
