@@ -132,6 +132,14 @@ def test_a_clock_set_back_keeps_the_order(tmp_path: Path, back: float) -> None:
     assert found.cleaning == replay.Cleaning(reordered=1, clock_steps=1)
 
 
+def test_a_coarse_clock_makes_no_gaps(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    lines = [f"{tick // 4},{'' if tick % 4 == 3 else tick},{0.5 * tick}" for tick in range(80)]
+    file.write_text("\n".join(["time,motor,tip", *lines]))
+    found = replay.read_record(file, "motor", "tip", "time")
+    assert found.cleaning == replay.Cleaning(interpolated=20)
+
+
 def test_gaps_are_counted(tmp_path: Path) -> None:
     lines = clean_lines(0)
     del lines[500:600], lines[1000:1200]

@@ -267,9 +267,8 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
     table[:, 0] = _interpolated(time, table[:, 0])
     is_known = np.isfinite(table[:, 0])
     table, rows, time = table[is_known], rows[is_known], time[is_known]
-    steps = np.diff(time)
-    median = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    gaps = steps[steps > GAP * median]
+    steps, longest = _steps(time)
+    gaps = steps[steps > longest]
     cleaning = Cleaning(
         blank=blank + int(np.count_nonzero(~is_known)),
         interpolated=int(np.count_nonzero(is_lone & is_known)),
@@ -297,6 +296,13 @@ def _sort_all(time: Floats, command: Floats) -> tuple[NDArray[np.intp], Floats, 
     return lines, time[lines], reordered, clock_steps
 
 
+def _steps(time: Floats) -> tuple[Floats, float]:
+    """Steps of time, and the longest that is no gap; repeated stamps of a coarse clock are none."""
+    steps = np.diff(time)
+    later = steps[steps > 0]
+    return steps, GAP * float(np.median(later)) if len(later) else 0.0
+
+
 def _interpolated(time: Floats, command: Floats) -> Floats:
     """The command at every time; NaN before, after, and in its gaps."""
     known = np.flatnonzero(np.isfinite(command))
@@ -305,8 +311,8 @@ def _interpolated(time: Floats, command: Floats) -> Floats:
     times = time[known]
     found = np.interp(time, times, command[known], left=np.nan, right=np.nan)
     following = np.clip(np.searchsorted(times, time), 1, len(times) - 1)
-    steps = np.diff(times)
-    is_gap = steps[following - 1] > GAP * float(np.median(steps))
+    steps, longest = _steps(times)
+    is_gap = steps[following - 1] > longest
     return np.where(np.isnan(command) & is_gap, np.nan, found)
 
 
