@@ -7,10 +7,8 @@ import platform
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 
-import cv2
-import mcap
-import numpy as np
 import tomlkit
 
 from tautscope._core import __version__
@@ -50,8 +48,15 @@ def software_versions() -> dict[str, str]:
         "tautscope": __version__,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
-        **{module.__name__: module.__version__ for module in (np, cv2, mcap)},
+        **{name: _version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
     }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:  # OpenCV has several packages
+        return "not installed"
 
 
 def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:
