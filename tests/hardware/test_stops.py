@@ -14,7 +14,7 @@ from tautscope.bench.servos import SimulatedServos
 from tautscope.cli import main
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
-from tautscope.errors import CalibrationError, FollowingError
+from tautscope.errors import EMERGENCY_STOP, CalibrationError, FollowingError
 from tautscope.hardware import stops as stops_module
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.stops import find_stops
@@ -148,3 +148,29 @@ def test_a_following_error_of_another_motor_is_no_stop(
     monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
     with pytest.raises(FollowingError):
         stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)
+
+
+class Unconfirmed(SoftStop):
+    """Drives that do not confirm their quick stop."""
+
+    opened = 0
+
+    def __enter__(self) -> Unconfirmed:
+        self.opened += 1
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        error = failure[1]
+        if isinstance(error, BaseException):
+            error.add_note(f"insertion: quick stop is not confirmed. {EMERGENCY_STOP}")
+
+
+def test_a_motor_whose_stop_is_not_confirmed_is_not_driven_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
+    drives = Unconfirmed("insertion, servo 1")
+    monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
+    with pytest.raises(FollowingError):
+        stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)
+    assert drives.opened == 1

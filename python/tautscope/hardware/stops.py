@@ -10,7 +10,7 @@ import numpy as np
 from tautscope.config import Config, DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN
 from tautscope.dof import Motor
-from tautscope.errors import CalibrationError, FollowingError
+from tautscope.errors import EMERGENCY_STOP, CalibrationError, FollowingError
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import exit_on_signals
@@ -108,7 +108,9 @@ def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -
                 command[dof] += step
                 at = float(_paced(drives, command)[dof])
     except FollowingError as error:
-        if not error.node.startswith(f"{dof.label},"):
+        # A motor that may still move is not started again.
+        is_stopped = not any(EMERGENCY_STOP in note for note in getattr(error, "__notes__", ()))
+        if not (is_stopped and error.node.startswith(f"{dof.label},")):
             raise
         with open_drives(config) as drives:
             command = drives.start()
