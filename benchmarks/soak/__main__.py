@@ -60,14 +60,12 @@ def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
         for stroke in options.stroke or (STROKES_WITH_RESTS if motion == "rests" else STROKES)
         for seed in range(options.first_seed, options.first_seed + options.seeds)
     ]
-    # The longest runs first.
-    jobs = sorted(cases, key=lambda case: case.plant != "twin")
     done: dict[Case, Outcome] = {}
     with progress_bar("soak") as show_progress:
         try:
-            for case, outcome in run_parallel(simulate, jobs, options.workers, options.scheduler):
+            for case, outcome in run_parallel(simulate, cases, options.workers, options.scheduler):
                 done[case] = outcome
-                show_progress(len(done) / len(jobs))
+                show_progress(len(done) / len(cases))
         except KeyboardInterrupt:
             pass
     return {case: done[case] for case in cases if case in done}

@@ -104,12 +104,12 @@ def test_only_motors_with_limited_torque_are_driven_against_stops(tmp_path: Path
 
 
 class SoftStop:
-    """Drives whose motor of insertion rests at its lower stop, and the highest of its commands."""
+    """Drives whose motor of insertion rests at its lower stop; its highest command, and starts."""
 
     cycle = 0.0
 
     def __init__(self, node: str) -> None:
-        self.node, self.highest = node, LOWER
+        self.node, self.highest, self.starts = node, LOWER, 0
 
     def __enter__(self) -> SoftStop:
         return self
@@ -118,6 +118,7 @@ class SoftStop:
         pass
 
     def start(self) -> np.ndarray:
+        self.starts += 1
         return np.array([LOWER, 0.0, 0.0])
 
     def exchange(self, command: np.ndarray) -> np.ndarray:
@@ -140,24 +141,8 @@ def test_a_motor_pressed_into_its_stop_is_not_driven_through_its_travel(
     assert drives.highest == LOWER
 
 
-def test_a_following_error_of_another_motor_is_no_stop(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
-    drives = SoftStop("insertion_2, servo 4")
-    monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
-    with pytest.raises(FollowingError):
-        stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)
-
-
 class Unconfirmed(SoftStop):
     """Drives that do not confirm their quick stop."""
-
-    opened = 0
-
-    def __enter__(self) -> Unconfirmed:
-        self.opened += 1
-        return self
 
     def __exit__(self, *failure: object) -> None:
         error = failure[1]
@@ -165,12 +150,14 @@ class Unconfirmed(SoftStop):
             error.add_note(f"insertion: quick stop is not confirmed. {EMERGENCY_STOP}")
 
 
-def test_a_motor_whose_stop_is_not_confirmed_is_not_driven_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "drives", [SoftStop("insertion_2, servo 4"), Unconfirmed("insertion, servo 1")]
+)
+def test_after_an_error_of_another_motor_or_an_unconfirmed_stop_nothing_moves(
+    drives: SoftStop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
-    drives = Unconfirmed("insertion, servo 1")
     monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
     with pytest.raises(FollowingError):
         stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)
-    assert drives.opened == 1
+    assert drives.starts == 1
