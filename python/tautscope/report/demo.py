@@ -266,7 +266,8 @@ def demo_report(demo: Demo, figures: Iterable[tuple[Figure, str]], film: bytes) 
         "simulated": f"{demo.sim_seconds:.0f} s in {(3 + len(profiles)) * len(seeds)} runs",
         "took": f"{demo.wall_seconds:.0f} s",
     }
-    verdict = "".join(f'<p class="verdict">{escape(line)}</p>' for line in demo.verdict)
+    lines = (escape(line).replace(" %", "&nbsp;%") for line in demo.verdict)
+    verdict = "".join(f'<p class="verdict">{line}</p>' for line in lines)
     return report.page(
         f"on a simulated instrument, camera images the only feedback; {count}",
         f"""{verdict}
