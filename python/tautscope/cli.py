@@ -27,7 +27,7 @@ from tautscope.commands import (
     report,
     ros2,
 )
-from tautscope.errors import USAGE, TautscopeError
+from tautscope.errors import USAGE, TautscopeError, notes
 from tautscope.extras import require_extras
 
 INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
@@ -72,16 +72,16 @@ def _main(arguments: Sequence[str] | None) -> int:
             require_extras(f"tautscope {options.verb}", options.extras)
             return options.run(options) or 0
     except TautscopeError as error:
-        print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
+        print("\n".join([f"error: {error}", *notes(error)]), file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt as stop:
-        print("\n".join(["interrupted", *getattr(stop, "__notes__", ())]), file=sys.stderr)
+        print("\n".join(["interrupted", *notes(stop)]), file=sys.stderr)
         return INTERRUPTED
     except OSError as error:
         if error.filename is None:
             raise
         text = f"error: {error.filename}: {error.strerror}"
-        print("\n".join([text, *getattr(error, "__notes__", ())]), file=sys.stderr)
+        print("\n".join([text, *notes(error)]), file=sys.stderr)
         return USAGE
 
 

@@ -217,6 +217,25 @@ class CameraMismatchError(CameraError):
     """A source that differs from its configuration; reopening it does not help."""
 
 
+def notes(error: BaseException) -> list[str]:
+    """Notes of an error, and what says of errors that it replaced that motors may still move.
+
+    A second Ctrl-C while motors stop replaces the error that tells it.
+    """
+    found: list[str] = list(getattr(error, "__notes__", ()))
+    replaced = error.__context__
+    while replaced is not None:
+        texts = [str(replaced), *getattr(replaced, "__notes__", ())]
+        found += [text for text in texts if EMERGENCY_STOP in text and text not in found]
+        replaced = replaced.__context__
+    return found
+
+
 def described(error: BaseException) -> str:
-    """An error with its notes, such as drives that did not confirm the stop after it."""
-    return "; ".join([str(error), *getattr(error, "__notes__", ())])
+    """An error with its `notes`."""
+    return "; ".join([str(error), *notes(error)])
+
+
+def may_move(error: BaseException) -> bool:
+    """Whether motors may still move after an error: their stop is not confirmed."""
+    return EMERGENCY_STOP in described(error)

@@ -31,6 +31,7 @@ from tautscope.errors import (
     MissingExtraError,
     MotionHeldError,
     OutputError,
+    StateError,
 )
 from tautscope.extras import MODULES, require_extras
 
@@ -159,6 +160,21 @@ def test_an_interruption_says_what_was_written(
     monkeypatch.setattr("tautscope.commands.config.load_config", stop)
     assert main(["config"]) == 130
     assert capsys.readouterr().err == "interrupted\nThe log of the run is run.mcap\n"
+
+
+def test_an_error_that_replaces_an_unconfirmed_stop_tells_it(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        try:
+            raise StateError("insertion, node 1", "quick stop is not confirmed", EMERGENCY_STOP)
+        finally:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("tautscope.commands.config.load_config", stop)
+    assert main(["config"]) == 130
+    told = f"insertion, node 1: quick stop is not confirmed. {EMERGENCY_STOP}"
+    assert capsys.readouterr().err == f"interrupted\n{told}\n"
 
 
 @pytest.mark.parametrize("note", ["The log is run.mcap", f"{EMERGENCY_STOP}: it may be moving"])

@@ -93,7 +93,7 @@ def test_unusable_eds_file(tmp_path: Path, text: str | None) -> None:
 )
 def test_units_and_signs(dof: Dof, position: float, counts: int) -> None:
     """Calculated by hand from the axes' settings."""
-    scale = Scale(drives_config()[dof], dof.label)
+    scale = Scale(drives_config()[dof], dof)
     assert scale.to_counts(position) == counts
     assert scale.to_position(counts) == pytest.approx(position, abs=1e-6)
 

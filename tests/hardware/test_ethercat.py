@@ -7,6 +7,8 @@ PDO 0x1600 and 0x1A00.
 from __future__ import annotations
 
 import struct
+import tempfile
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,11 +25,13 @@ from tautscope.errors import (
     SettingRefusedError,
     SilentDriveError,
     StateError,
+    may_move,
 )
 from tautscope.hardware.cia402 import STOPPED_STATES, Mode, State
 from tautscope.hardware.cia402_drives import Cia402Drives
 from tautscope.hardware.drives import Drives
 from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus
+from tautscope.hardware.rig_lock import RigLock
 
 INIT, PREOP, SAFEOP, OP = 1, 2, 4, 8
 
@@ -278,6 +282,53 @@ def test_the_others_are_stopped_before_the_error_code_is_read(
         with pytest.raises(EmergencyError):
             drives.exchange(drives.last_command)
         assert found == [State.QUICK_STOP_ACTIVE]
+
+
+def test_a_fault_is_told_though_its_code_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    soem, master, config = line()
+
+    def sdo_read(slave: Slave, index: int, subindex: int) -> bytes:
+        raise WkcError
+
+    with running(soem, config) as drives:
+        master.slaves[1].drive.fail(0.0)
+        monkeypatch.setattr(Slave, "sdo_read", sdo_read)
+        with pytest.raises(EmergencyError, match=r"rotation, device 2.*error code not read"):
+            drives.exchange(drives.last_command)
+
+
+def test_the_adapter_is_released_if_the_line_cannot_be_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(master: Master) -> int:
+        raise ConnectionError
+
+    monkeypatch.setattr(Master, "config_init", fail)
+    soem, master, config = line()
+    with pytest.raises(ConnectionError):
+        EthercatFieldbus(config, soem)
+    assert master.open_on is None
+
+
+def test_a_stop_that_is_not_confirmed_is_told_though_the_adapter_fails(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def fail(master: Master) -> None:
+        raise OSError("adapter is lost")
+
+    soem, master, config = line()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    group = Cia402Drives(config, EthercatFieldbus(config, soem))
+    drives = Drives(config, group, RigLock(config))
+    drives.start()
+    master.slaves[2].is_silent = True
+    monkeypatch.setattr(Master, "close", fail)
+    with pytest.raises(OSError, match="adapter is lost") as found:
+        drives.close()
+    assert may_move(found.value)
+    with RigLock(config):
+        pass
 
 
 def test_faults_of_all_drives_are_reset_at_once() -> None:

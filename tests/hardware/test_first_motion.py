@@ -47,7 +47,7 @@ def test_each_kind_of_motor_has_a_short_configuration() -> None:
 def test_a_servos_start_is_within_its_first_turn(protocol: str) -> None:
     drives = require_drives(from_document(document(protocol)))
     for dof in Dof:
-        assert 0 <= Scale(drives[dof], dof.label).to_counts(0.0) < 4096
+        assert 0 <= Scale(drives[dof], dof).to_counts(0.0) < 4096
 
 
 def test_counts_of_a_gear() -> None:

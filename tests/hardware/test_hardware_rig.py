@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,10 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_rig import CYCLE, HOME, Setup, rig_config
+from fake_rig import CYCLE, HOME, FakeMotors, Setup, rig_config
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import (
+    EMERGENCY_STOP,
     CameraError,
     ConfigError,
     DriveError,
@@ -24,6 +26,8 @@ from tautscope.errors import (
     MotionHeldError,
     SignalError,
     StateError,
+    may_move,
+    notes,
 )
 from tautscope.hardware.experiment import _apply_reaction, run_on_hardware
 from tautscope.hardware.rig import HardwareRig
@@ -72,13 +76,25 @@ def test_move_to_start_respects_the_start_speed(
     assert sample.time == 0.0
 
 
-def test_motor_outside_its_travel_is_not_moved(setup: Callable[..., Setup]) -> None:
-    one = setup()
-    one.motors.start = lambda: np.array([0.01, 3.6, 0.2])  # type: ignore[method-assign]
-    with pytest.raises(FollowingError, match=r"rotation, node 2: position 3.6 is outside"):
-        one.rig.reset()
-    assert not one.motors.commands
-    assert one.motors.stopped == one.camera.closed == 1
+def test_a_second_ctrl_c_does_not_hide_a_stop_that_is_not_confirmed(
+    setup: Callable[..., Setup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, text = setup(), f"rotation, node 2: quick stop is not confirmed. {EMERGENCY_STOP}"
+
+    def stop_without_confirmation(*_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        time.sleep(0.2)
+        raise StateError("rotation, node 2", "quick stop is not confirmed", EMERGENCY_STOP)
+
+    monkeypatch.setattr(FakeMotors, "__exit__", stop_without_confirmation)
+    one.rig.reset()
+    with pytest.raises(KeyboardInterrupt) as found:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            one.rig.close()
+    assert may_move(found.value)
+    assert notes(found.value) == [text]
 
 
 def test_each_command_is_sent_once_in_order_by_one_thread(setup: Callable[..., Setup]) -> None:

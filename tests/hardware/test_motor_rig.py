@@ -21,7 +21,7 @@ from tautscope import Tip, run_experiment
 from tautscope.bench.any_motors import make_motors
 from tautscope.cli import main
 from tautscope.config import Config, dump_config, from_document, load_config
-from tautscope.errors import ConfigError, SignalError
+from tautscope.errors import ConfigError, SettingRefusedError, SignalError
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.hardware.motor_rig import MotorRig
 from tautscope.loop.kinematics import TwoPlanes
@@ -107,6 +107,17 @@ def test_a_motor_by_its_name_ends_the_run(tmp_path: Path) -> None:
         stack.enter_context(make_motors(right.drives, stack, start=np.zeros(4)))
         with pytest.raises(Exception, match=r"joint_3.*drives\.motors\.joint_3\.node"):
             Arm(wrong).reset()
+
+
+def test_a_limit_of_the_microcontroller_is_named_with_the_motor_of_a_robot(tmp_path: Path) -> None:
+    document = robot_document("serial", tmp_path, 2)
+    right = from_document(document)
+    document["drives"]["motors"]["joint_2"]["travel"] = [-1.5e6, 0.0]
+    assert right.drives is not None
+    with ExitStack() as stack:
+        stack.enter_context(make_motors(right.drives, stack, start=np.zeros(2)))
+        with pytest.raises(SettingRefusedError, match=r"drives\.motors\.joint_2\.travel is"):
+            Arm(from_document(document)).reset()
 
 
 def test_it_is_written_and_read_back(tmp_path: Path) -> None:

@@ -26,7 +26,9 @@ from tautscope.errors import (
 )
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.hardware.drives import Drives, open_drives
+from tautscope.hardware.servos.families import Register
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
+from tautscope.hardware.servos.servo import Servo
 from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
@@ -229,6 +231,36 @@ def test_fault_persists_until_it_is_reset(protocol: str, tmp_path: Path) -> None
             np.testing.assert_allclose(position, START, atol=2e-3)
 
 
+def test_a_stop_while_servos_are_enabled_holds_them_where_the_reset_left_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reset = Servo.reset_fault
+
+    def reset_and_move(servo: Servo, before: int) -> int:
+        moved = motors.servos[0]
+        moved.set(moved.family.position, before + 300)
+        return reset(servo, before)
+
+    config = servos_config("feetech", tmp_path)
+    with SimulatedServos(config, start=START) as motors:
+        before = motors.servos[0].get(motors.servos[0].family.position)
+        motors.inject("fault", Dof.INSERTION)
+        until(lambda: bool(motors.events))
+        motors.clear(Dof.INSERTION)
+        monkeypatch.setattr(Servo, "reset_fault", reset_and_move)
+        read = Servo.read
+
+        def without_torque(servo: Servo, register: Register) -> int:
+            is_second = servo.id == 2 and register == motors.servos[0].family.torque
+            return 0 if is_second else read(servo, register)
+
+        monkeypatch.setattr(Servo, "read", without_torque)
+        with open_drives(config) as drives, pytest.raises(StateError, match="torque stays off"):
+            drives.start(reset_faults=True)
+        goal = motors.servos[0].get(motors.servos[0].family.goal)
+    assert goal > before + 100, "not back to where it was before the reset"
+
+
 @FAMILIES
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
@@ -268,14 +300,15 @@ def test_position_outside_the_travel_and_missing_port(protocol: str, tmp_path: P
     config = servos_config(protocol, tmp_path)
     with pytest.raises(BusError, match=r"cannot be opened.*drives\.channel"):
         open_drives(config)
-    bending = AXES["bending"] | {"model": MODELS[protocol], "travel": [1.0, 2.0]}
-    with (
-        SimulatedServos(config, start=START),
-        open_drives(servos_config(protocol, tmp_path, bending=bending)) as drives,
-        pytest.raises(FollowingError, match="outside its travel") as found,
-    ):
-        drives.start()
-    assert "drives.bending.home" in str(found.value)
+    for lower in (1.0, START[Dof.BENDING] + 0.01):  # by more and by less than a following error
+        bending = AXES["bending"] | {"model": MODELS[protocol], "travel": [lower, 2.0]}
+        with (
+            SimulatedServos(config, start=START),
+            open_drives(servos_config(protocol, tmp_path, bending=bending)) as drives,
+            pytest.raises(FollowingError, match="outside its travel") as found,
+        ):
+            drives.start()
+        assert "drives.bending.home" in str(found.value)
 
 
 @FAMILIES

@@ -46,7 +46,7 @@ class SimulatedMotors(ABC):
         start: NDArray[np.float64] | None,
     ) -> None:
         self._config, self._on_cycle = config, on_cycle
-        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+        self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
         self._start = np.zeros(len(self._scales)) if start is None else start
         self._events: list[Event] = []
         self._requests: deque[tuple[str, Motor, float]] = deque()

@@ -13,7 +13,7 @@ from tautscope.commands.result_lines import print_results
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.run_protocol import add_protocol, apply_protocol, write_environment
 from tautscope.config.placeholders import refuse_placeholders
-from tautscope.errors import EMERGENCY_STOP, FieldError
+from tautscope.errors import FieldError, may_move, notes
 from tautscope.hardware.doctor.computer import bytes_per_second
 from tautscope.loop.references import SineSequence
 from tautscope.runs.output_folder import recording_saved
@@ -91,10 +91,8 @@ def _run(options: argparse.Namespace) -> int:
         with recording_saved(folder), progress_bar("run") as progress:
             found = run_on_hardware(config, folder, progress, reference, compare=options.compare)
     except KeyboardInterrupt as stop:
-        notes = getattr(stop, "__notes__", ())
-        is_stopped = not any(EMERGENCY_STOP in note for note in notes)
-        what = "Interrupted." + " The motors are stopped." * is_stopped
-        print("\n".join([what, *notes]), file=sys.stderr)
+        what = "Interrupted." + " The motors are stopped." * (not may_move(stop))
+        print("\n".join([what, *notes(stop)]), file=sys.stderr)
         return 130
     write_run_folder(found, folder)
     if options.protocol == "desktop":

@@ -79,7 +79,7 @@ def read_reference(options: argparse.Namespace, config: Config) -> RecordedRefer
             farthest = max(positions[:, dof], key=lambda each: max(lower - each, each - upper))
             if not lower <= farthest <= upper:
                 where = f"{options.reference}, column {dof.label}"
-                allowed = f"{lower:g} to {upper:g}, drives.{dof.label}.travel"
+                allowed = f"{lower:g} to {upper:g}, {dof.key}.travel"
                 raise RecordError(where, float(farthest), allowed)
     return RecordedReference(time, positions, config)
 

@@ -16,7 +16,7 @@ from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
 from tautscope.console.shared import Channels, SharedMemory
-from tautscope.errors import STOPPED, ConfigError, StateError
+from tautscope.errors import STOPPED, ConfigError, StateError, may_move
 from tautscope.hardware.realtime import LOOP, OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
@@ -49,7 +49,9 @@ def start_console(
         with realtime_process(OTHERS if isinstance(rig, HardwareRig) else LOOP):
             try:
                 Session(control, channels, lambda: not server.is_alive()).main()
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as stop:
+                if may_move(stop):
+                    raise
                 return 0
     error = StateError("web server", "it ended", "Motion is stopped. Start the console again")
     error.exit_status = STOPPED

@@ -65,7 +65,7 @@ class _DriveSetup:
 
     def __init__(self, bus: Fieldbus, config: DrivesConfig, dof: Motor) -> None:
         self._bus, self._config, self._dof = bus, config, dof
-        self._scale = Scale(config[dof], dof.label)
+        self._scale = Scale(config[dof], dof)
         self.settings: dict[str, int] = {}
         self.absent: list[str] = []
 

@@ -35,17 +35,6 @@ class BusStatistics:
     longest_pause: float = 0.0
 
 
-def outside_travel(
-    name: str, dof: Motor, position: float, travel: tuple[float, float]
-) -> FollowingError:
-    """The error for a motor at a position [m or rad] outside its travel."""
-    return FollowingError(
-        name,
-        f"position {position:.6g} is outside its travel {travel[0]:g} to {travel[1]:g}",
-        f"Move it inside by hand, or check {dof.key}.home, sign and counts_per_unit",
-    )
-
-
 class DriveMonitor:
     """Checks the feedback of drives in each cycle.
 
@@ -58,7 +47,7 @@ class DriveMonitor:
     def __init__(self, config: DrivesConfig, names: Sequence[str], pending: int) -> None:
         self._config = config
         self._names = names
-        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+        self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
         self._before: list[tuple[float, int]] = []
         """Position [m or rad] and age of each motor in the last cycle."""
         self._answers = [0] * len(self._scales)
@@ -128,10 +117,13 @@ class DriveMonitor:
         """
         for dof, scale in zip(self._config.all_motors, self._scales, strict=True):
             position = scale.to_position(counts[dof])
-            lower, upper = self._config[dof].travel
-            margin = self._config[dof].following_error
-            if not lower - margin <= position <= upper + margin:
-                raise outside_travel(self._names[dof], dof, position, (lower, upper))
+            if not scale.is_inside(position):
+                lower, upper = self._config[dof].travel
+                raise FollowingError(
+                    self._names[dof],
+                    f"position {position:.6g} is outside its travel {lower:g} to {upper:g}",
+                    f"Move it inside by hand, or check {dof.key}.home, sign and counts_per_unit",
+                )
 
     @property
     def pause_note(self) -> str:
@@ -178,8 +170,8 @@ class DriveMonitor:
                 name,
                 f"following error: position {position:.6g}, recent commands "
                 f"{following.lower[dof]:.6g} to {following.upper[dof]:.6g}{note}",
-                "Check whether something blocks the motor, then drives."
-                f"{dof.label}.counts_per_unit, following_error, following_window and drives.lag",
+                f"Check whether something blocks the motor, then {dof.key}"
+                ".counts_per_unit, following_error, following_window and drives.lag",
             )
         jump = abs(position - last)
         elapsed = (age + 2) * self._config.cycle

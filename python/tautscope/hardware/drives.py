@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from typing import Self
 
 import numpy as np
@@ -22,7 +23,14 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import DrivesConfig
 from tautscope.config.microcontroller import PROTOCOL
 from tautscope.config.servos import PORTS
-from tautscope.errors import EMERGENCY_STOP, DriveError, SignalError, StateError
+from tautscope.errors import (
+    EMERGENCY_STOP,
+    STOPPED,
+    DriveError,
+    SignalError,
+    StateError,
+    described,
+)
 from tautscope.extras import require_extras
 from tautscope.hardware.cia402_drives import Cia402Drives
 from tautscope.hardware.drive_group import DriveGroup
@@ -96,7 +104,7 @@ class Drives:
         self.config = config
         self._lock = lock
         self._group = group
-        self._scales = [Scale(config[dof], dof.label) for dof in config.all_motors]
+        self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
         self._is_running = False
         self._is_closed = False
         self._previous: NDArray[np.float64] = np.zeros(len(config.all_motors))
@@ -246,12 +254,11 @@ class Drives:
             if self._is_closed:
                 return
             self._is_closed = True
-            try:
-                _require_confirmed(self._quick_stop())
-            finally:
-                self._group.close()
+            with ExitStack() as resources:
                 if self._lock is not None:
-                    self._lock.release()
+                    resources.callback(self._lock.release)
+                resources.callback(self._group.close)
+                _require_confirmed(self._quick_stop())
 
     def __enter__(self) -> Self:
         return self
@@ -262,7 +269,7 @@ class Drives:
         except DriveError as failed:
             if error is None:
                 raise
-            error.add_note(str(failed))
+            error.add_note(described(failed))
 
     def _stop_after(self, error: BaseException) -> None:
         self._monitor.note_pause()
@@ -292,8 +299,10 @@ def _as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:
 
 def _require_confirmed(unconfirmed: list[str], what: str = "quick stop") -> None:
     if unconfirmed:
-        raise StateError(
+        error = StateError(
             "; ".join(unconfirmed),
             f"{what} is not confirmed",
             f"{EMERGENCY_STOP}: the motor may be moving",
         )
+        error.exit_status = STOPPED
+        raise error

@@ -19,6 +19,7 @@ from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.errors import (
     BusError,
+    DriveError,
     EmergencyError,
     SettingRefusedError,
     SilentDriveError,
@@ -81,15 +82,18 @@ class EthercatFieldbus(Fieldbus):
                 f"{config.channel} cannot be opened: {error}",
                 "Check drives.channel; raw sockets need root or CAP_NET_RAW",
             ) from error
-        found = self._master.config_init()
         needed = max(config[dof].node for dof in config.all_motors)
-        if found < needed:
+        try:
+            found = self._master.config_init()
+            if found < needed:
+                raise BusError(
+                    "EtherCAT",
+                    f"{max(found, 0)} devices on {config.channel}, {needed} needed",
+                    "Check cables and supplies, and drives.*.node",
+                )
+        except BaseException:
             self.close()
-            raise BusError(
-                "EtherCAT",
-                f"{max(found, 0)} devices on {config.channel}, {needed} needed",
-                "Check cables and supplies, and drives.*.node",
-            )
+            raise
         self._slaves = {
             dof: _Slave(
                 f"{dof.label}, device {config[dof].node}", self._master.slaves[config[dof].node - 1]
@@ -138,10 +142,13 @@ class EthercatFieldbus(Fieldbus):
             if slave.is_enabled and state in (State.FAULT, State.FAULT_REACTION):
                 # The mailbox may take most of a second, in which the others would move on.
                 self.broadcast(cia402.QUICK_STOP, targets)
-                code = self.read(dof, objects.ERROR_CODE)
+                try:
+                    code = f"0x{self.read(dof, objects.ERROR_CODE):04X}"
+                except DriveError:
+                    code = "not read: its mailbox does not answer"
                 raise EmergencyError(
                     slave.name,
-                    f"it went to {state}, error code 0x{code:04X}",
+                    f"it went to {state}, error code {code}",
                     "Look the code up in the drive's manual; start again with reset_faults",
                 )
             slave.is_enabled = state is State.OPERATION_ENABLED

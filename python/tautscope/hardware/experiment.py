@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from tautscope.config import Config
-from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
+from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError, described
 from tautscope.hardware.plausibility import PlausibilityMonitor, check_experiment
 from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
@@ -126,16 +126,16 @@ def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
     if reaction.rank < Reaction.QUICK_STOP.rank:
         return
     is_disabled = reaction is Reaction.DISABLE
-    done, notes = f"The motors are {'without power' if is_disabled else 'stopped'}. ", list[str]()
+    done, failed = f"The motors are {'without power' if is_disabled else 'stopped'}. ", ""
     try:
         rig.disable() if is_disabled else rig.close()
     except TautscopeError as error:
-        done, notes = "", [str(error), *getattr(error, "__notes__", ())]
+        done, failed = "", described(error)
     stop = DriveError(
         "loop",
         f"{reaction} ({', '.join(supervision.flags)})",
         f"{done}docs/safety.md explains the flags; the log shows the cause",
     )
-    for note in notes:
-        stop.add_note(note)
+    if failed:
+        stop.add_note(failed)
     raise stop

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tautscope.config import AxisConfig
+from tautscope.dof import Motor
 from tautscope.errors import SignalError
 
 
@@ -17,11 +18,11 @@ class Scale:
 
     Attributes:
         axis: Units, sign, home and limits.
-        label: The DOF's name, for errors.
+        dof: The motor, for errors.
     """
 
     axis: AxisConfig
-    label: str
+    dof: Motor
 
     def to_counts(self, position: float) -> int:
         """Convert a position [m or rad] to the nearest count."""
@@ -42,6 +43,12 @@ class Scale:
         """The speed limit [counts/s], rounded up."""
         return math.ceil(self.axis.speed_limit * self.axis.counts_per_unit)
 
+    def is_inside(self, position: float) -> bool:
+        """Whether a position [m or rad] is inside the travel, give or take a count."""
+        lower, upper = self.axis.travel
+        count = 1 / self.axis.counts_per_unit
+        return lower - count <= position <= upper + count
+
     def checked_counts(self, command: float, previous: float, cycle: float) -> int:
         """Convert a command to counts, after checking it against the limits.
 
@@ -54,19 +61,18 @@ class Scale:
             SignalError: The command is not finite, outside the travel, or exceeds the speed limit.
         """
         axis = self.axis
-        field = f"command[{self.label}]"
-        lower, upper = axis.travel
-        rounding = 1 / axis.counts_per_unit
+        field = f"command[{self.dof.label}]"
         if not math.isfinite(command):
             raise SignalError(field, command, "a finite number")
-        if not lower - rounding <= command <= upper + rounding:
-            raise SignalError(field, command, f"{lower} to {upper}, drives.{self.label}.travel")
-        step = axis.speed_limit * cycle + rounding
+        if not self.is_inside(command):
+            lower, upper = axis.travel
+            raise SignalError(field, command, f"{lower} to {upper}, {self.dof.key}.travel")
+        step = axis.speed_limit * cycle + 1 / axis.counts_per_unit
         if abs(command - previous) > step:
             raise SignalError(
                 field,
                 command,
-                f"within {step:.6g} of {previous:.6g}, drives.{self.label}.speed_limit "
+                f"within {step:.6g} of {previous:.6g}, {self.dof.key}.speed_limit "
                 f"over a cycle of {cycle} s",
             )
         return self.to_counts(command)

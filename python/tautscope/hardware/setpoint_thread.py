@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import StateError
-from tautscope.hardware.drive_monitor import outside_travel
 from tautscope.hardware.drives import Drives
 from tautscope.hardware.realtime import SETPOINTS, realtime
+from tautscope.hardware.signals import defer_signals
 from tautscope.hardware.timing import Timing
 
 Floats = NDArray[np.float64]
@@ -103,16 +103,18 @@ class SetpointThread:
         """
         with self._condition:
             self._is_stopping, self._is_disabling = True, disable
-        if self._thread.ident is not None:
+        if self._thread.ident is None:
+            return
+        with defer_signals():
             self._thread.join()
-        if not (self._is_reported or self._has_timed_out):
-            self._raise_failure()
-        if disable and self._thread.ident is not None and not self._is_disabled:
-            raise StateError(
-                "drives",
-                "they were stopped before, and may hold the motors: voltage is not disabled",
-                "Switch their supply off",
-            )
+            if not (self._is_reported or self._has_timed_out):
+                self._raise_failure()
+            if disable and not self._is_disabled:
+                raise StateError(
+                    "drives",
+                    "they were stopped before, and may hold the motors: voltage is not disabled",
+                    "Switch their supply off",
+                )
 
     def _wait_for_answer(self) -> tuple[float, Floats]:
         self._condition.wait_for(lambda: self._sent is not None or self._is_over)
@@ -145,10 +147,6 @@ class SetpointThread:
     def _move_to_start(self, motors: Drives, position: Floats) -> None:
         """Move along half a cosine to the start, at `start_speed` of the speed limits at most."""
         config = self._config
-        for dof in self._config.all_motors:
-            axis, at = config[dof], float(position[dof])
-            if not axis.travel[0] <= at <= axis.travel[1]:
-                raise outside_travel(f"{dof.label}, node {axis.node}", dof, at, axis.travel)
         self._start = position if self._start is None else self._start
         distance = self._start - position
         speeds = (

@@ -10,7 +10,7 @@ import numpy as np
 from tautscope.config import Config, DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN
 from tautscope.dof import Motor
-from tautscope.errors import EMERGENCY_STOP, CalibrationError, FollowingError
+from tautscope.errors import CalibrationError, FollowingError, may_move
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import exit_on_signals
@@ -79,10 +79,10 @@ def find_stops(config: Config, dof: Motor, torque: float) -> Stops:
 def _search_config(config: Config, dof: Motor, torque: float) -> DrivesConfig:
     """The drives with little torque and a travel that hardly ends."""
     assert config.drives is not None
-    axis, path = config.drives[dof], f"{dof.key}"
+    axis, path = config.drives[dof], dof.key
     reach = (1 + _REACH) * (axis.travel[1] - axis.travel[0])
     # A restarted servo reports a position within its first turn, wherever that is in the DOF.
-    turn = sorted(Scale(axis, dof.label).to_position(count) for count in (0, COUNTS_PER_TURN))
+    turn = sorted(Scale(axis, dof).to_position(count) for count in (0, COUNTS_PER_TURN))
     changes = {
         f"{path}.stops": None,
         f"{path}.torque_limit": torque,
@@ -109,8 +109,7 @@ def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -
                 at = float(_paced(drives, command)[dof])
     except FollowingError as error:
         # A motor that may still move is not started again.
-        is_stopped = not any(EMERGENCY_STOP in note for note in getattr(error, "__notes__", ()))
-        if not (is_stopped and error.node.startswith(f"{dof.label},")):
+        if may_move(error) or not error.node.startswith(f"{dof.label},"):
             raise
         with open_drives(config) as drives:
             command = drives.start()

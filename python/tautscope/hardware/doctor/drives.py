@@ -122,7 +122,7 @@ def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckRe
         status = group.status(dof)
     except DriveError as error:
         return from_error("drives", what, error)
-    position = Scale(config[dof], dof.label).to_position(status.position)
+    position = Scale(config[dof], dof).to_position(status.position)
     unit, scale = dof.display_unit, dof.display_scale
     found = f"at {scale * position:.4g} {unit}; {status.found}"
     data = {

@@ -90,22 +90,22 @@ class SerialDrives(DriveGroup):
         Raises:
             SettingRefusedError: There is no such axis, or a limit is beyond those.
         """
-        limits, label = self._limits(dof), dof.label
-        scale = Scale(self._config[dof], label)
+        limits = self._limits(dof)
+        scale = Scale(self._config[dof], dof)
         lower, upper = scale.travel_counts()
         if lower < limits.lower or upper > limits.upper:
             raise SettingRefusedError(
                 self.name(dof),
-                f"drives.{label}.travel is {lower} to {upper} counts, and the microcontroller "
+                f"{dof.key}.travel is {lower} to {upper} counts, and the microcontroller "
                 f"takes {limits.lower} to {limits.upper}",
                 "Correct travel, home or counts_per_unit, or the limits in its program",
             )
         if (speed := scale.speed_counts()) > limits.speed:
             raise SettingRefusedError(
                 self.name(dof),
-                f"drives.{label}.speed_limit is {speed} counts/s, and the microcontroller "
+                f"{dof.key}.speed_limit is {speed} counts/s, and the microcontroller "
                 f"reaches {limits.speed}",
-                f"Lower drives.{label}.speed_limit, or let a step be a larger motion",
+                f"Lower {dof.key}.speed_limit, or let a step be a larger motion",
             )
         return CommissionedDrive(self.name(dof), 0, 0, 0, limits._asdict())
 

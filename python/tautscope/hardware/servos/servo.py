@@ -94,7 +94,7 @@ class Servo:
         number = self.read(self._family.model)
         if number != MODELS[self._model].number:
             raise ModeRefusedError(self.name, *self._wrong_model(number))
-        scale = Scale(self._axis, self._dof.label)
+        scale = Scale(self._axis, self._dof)
         furthest = max(map(abs, scale.travel_counts()))
         if furthest > self._family.largest:
             raise SettingRefusedError(

@@ -79,6 +79,8 @@ class ServoDrives(DriveGroup):
                 if not reset_faults:
                     raise StateError(servo.name, *servo.fault(faults))
                 self._goals[dof] = servo.reset_fault(self._goals[dof])
+        # A stop while they are being enabled holds them there, not where they were before a reset.
+        super().start(self._goals)
         for servo, goal in zip(self._servos, self._goals, strict=True):
             self._was_enabled = self._is_moving = True
             servo.may_search = False
