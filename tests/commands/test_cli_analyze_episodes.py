@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,7 @@ def test_workers_do_not_change_the_result(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data_set = write(tmp_path / "set", "v3.0", of_episodes.CHUNK + 1, 300)
+    environment = dict(os.environ)
     one, two = (
         analyzed(capsys, data_set, *COLUMNS, "--workers", n, "--out", tmp_path / str(n))["dofs"]
         for n in (1, 2)
@@ -74,6 +76,7 @@ def test_workers_do_not_change_the_result(
     assert one == two
     files = [(tmp_path / n / "episodes.csv").read_text() for n in ("1", "2")]
     assert files[0] == files[1]
+    assert dict(os.environ) == environment
 
 
 @pytest.mark.usefixtures("undrawn", "three_models")
