@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.requests import read_requests
 from tautscope.commands import arguments
+from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.signals import exit_on_signals
@@ -85,6 +86,8 @@ def _bench(options: argparse.Namespace) -> None:
     )
 
     config = arguments.article_config(options.config)
+    if config.drives is not None and config.drives.protocol in SERIAL_PORTS:
+        arguments.refuse_unused(options, "CiA 402 drives, in --config", "modes")
     if options.truth is not None and options.truth.is_file():
         raise OutputError("--truth", str(options.truth), "a file that does not exist yet")
     if options.drawn is not None:
