@@ -8,11 +8,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.bench.events import EventPrinter
-from tautscope.bench.requests import read_requests
+from tautscope.bench.requests import serve_requests
 from tautscope.commands import arguments
 from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Dof
@@ -104,24 +105,17 @@ def _bench(options: argparse.Namespace) -> None:
         if refusal:
             print(f"warning: {refusal}", file=sys.stderr, flush=True)
         print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-        printer = EventPrinter(lambda: bench.events)
         stopping = threading.Event()
         injector = threading.Thread(
             target=_inject_faults, args=(bench, sorted(options.faults), stopping)
         )
         injector.start()
-        try:
-            for line in read_requests():
-                try:
-                    bench.request(line)
-                except ConfigError as error:
-                    print(f"error: {error}", file=sys.stderr, flush=True)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            stopping.set()
-            injector.join()
-            printer.close()
+        with closing(EventPrinter(lambda: bench.events)):
+            try:
+                serve_requests(bench.request)
+            finally:
+                stopping.set()
+                injector.join()
 
 
 def _check_faults(bench: Bench, faults: Iterable[tuple[float, str]]) -> None:
