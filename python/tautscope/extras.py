@@ -1,8 +1,9 @@
-"""Optional dependencies: the modules of each extra, and the error if one is missing."""
+"""Optional dependencies: modules of each extra, their versions, the error if one is missing."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 from tautscope.errors import MissingExtraError
@@ -31,6 +32,14 @@ MODULES = {
     "cluster": ("dask", "distributed"),
 }
 """Extra -> modules that it installs for import."""
+
+
+def installed_version(package: str) -> str:
+    """The version of a package by its name on PyPI, or ``not installed``."""
+    try:
+        return version(package)
+    except PackageNotFoundError:  # OpenCV has several packages
+        return "not installed"
 
 
 def missing_modules(extra: str) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from tautscope.calibration.geometry import sweep
 from tautscope.calibration.result import CalibrationResult
 from tautscope.cli import main
-from tautscope.commands import calibration_steps, question
+from tautscope.commands import calibration_session, calibration_steps, question
 from tautscope.commands.calibration_steps import Step
 from tautscope.config import Config, load_config
 from tautscope.config.load import config_file
@@ -199,3 +200,20 @@ def test_the_twin_is_calibrated_from_camera_to_motion(
     assert true[1] < 0.6
     assert true[2] < 0.4
     assert Path("out/report.html").stat().st_size > 100_000
+
+
+def test_two_processes_do_not_share_a_temporary_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, replace = tmp_path / "state.json", Path.replace
+
+    def late(partial: Path, target: Path) -> None:
+        monkeypatch.setattr(Path, "replace", replace)
+        monkeypatch.setattr(os, "getpid", lambda: 1)
+        calibration_session._write(file, "theirs")
+        partial.replace(target)
+
+    monkeypatch.setattr(Path, "replace", late)
+    calibration_session._write(file, "mine")
+    assert json.loads(file.read_text()) == "mine"
+    assert list(tmp_path.iterdir()) == [file]

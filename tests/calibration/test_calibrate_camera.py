@@ -129,7 +129,7 @@ def test_refusals_write_nothing(capsys: Capture, tmp_path: Path, files: list[str
     assert "show the board at the" in error
     assert "--config" in failed(capsys, *COMMAND, *files, "--write")
     assert "a file of your own" in failed(capsys, *COMMAND, "--config", "bench", "--write")
-    assert "files or --twin" in failed(capsys, *COMMAND, files[0], "--twin")
+    assert "--twin: got True, expected no files" in failed(capsys, *COMMAND, files[0], "--twin")
     assert "--twin" in failed(capsys, *COMMAND)
     assert "File not found" in failed(capsys, *COMMAND, str(tmp_path / "none.mp4"))
     assert "a video file that FFmpeg reads" in failed(capsys, *COMMAND, str(text))

@@ -112,7 +112,7 @@ def test_a_log_without_enough_motion_is_refused(
         (["missing.mcap"], "File not found: missing.mcap"),
         ([], "--config"),
         (["--motors", "motors.csv"], "a video together with --motors"),
-        (["run.mcap", "--twin"], "no file together with --twin"),
+        (["run.mcap", "--twin"], "--twin: got True, expected no files"),
     ],
 )
 def test_bad_sources_are_named(capsys: Capture, arguments: list[str], message: str) -> None:

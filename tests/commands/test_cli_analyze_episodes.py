@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,7 @@ def test_workers_do_not_change_the_result(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data_set = write(tmp_path / "set", "v3.0", of_episodes.CHUNK + 1, 300)
+    environment = dict(os.environ)
     one, two = (
         analyzed(capsys, data_set, *COLUMNS, "--workers", n, "--out", tmp_path / str(n))["dofs"]
         for n in (1, 2)
@@ -74,6 +76,7 @@ def test_workers_do_not_change_the_result(
     assert one == two
     files = [(tmp_path / n / "episodes.csv").read_text() for n in ("1", "2")]
     assert files[0] == files[1]
+    assert dict(os.environ) == environment
 
 
 @pytest.mark.usefixtures("undrawn", "three_models")
@@ -148,17 +151,16 @@ def test_damage_is_named(
 def test_options_that_do_not_belong_are_refused(
     data_set: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-
-    def refused(*options: object) -> str:
-        with pytest.raises(SystemExit):
-            main(["analyze", *map(str, options)])
-        return capsys.readouterr().err
-
     for option in (["--gain", "2"], ["--check"]):
-        assert f"{option[0]} of a data set needs --episode" in refused(data_set, *COLUMNS, *option)
+        text = failed(capsys, "analyze", str(data_set), *COLUMNS, *option)
+        assert text.startswith(f"error: {option[0]}: got ")
+        assert "expected --episode" in text
+    one = failed(capsys, "analyze", str(data_set), *COLUMNS, "--episode", "0", "--workers", "2")
+    assert "--workers: got 2, expected no --episode" in one
     (tmp_path / "a.csv").write_text("a,b\n1,2\n")
-    text = refused(tmp_path / "a.csv", "--workers", "2")
-    assert "--workers is for the folder of a data set" in text
+    with pytest.raises(SystemExit):
+        main(["analyze", str(tmp_path / "a.csv"), *COLUMNS, "--workers", "2"])
+    assert "--workers is for the folder of a data set" in capsys.readouterr().err
 
 
 def test_a_file_with_several_episodes_is_refused(

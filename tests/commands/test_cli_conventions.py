@@ -55,6 +55,61 @@ def verbs() -> dict[str, argparse.ArgumentParser]:
     return found
 
 
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        ("analyze log.csv --time t", "--time"),
+        ("analyze log.csv --missing -9999", "--missing"),
+        ("analyze log.csv --check", "--check"),
+        ("analyze log.csv --out new", "--out"),
+        ("bench --config bench_feetech --modes 8", "--modes"),
+        ("calibrate all --config rig.toml --seed 3", "--seed"),
+        ("calibrate all --config rig.toml --twin --yes", "--yes"),
+        ("calibrate all --config rig.toml --twin --seconds 20", "--seconds"),
+        ("calibrate camera --board board.pdf a.png", "--board"),
+        ("calibrate camera --board board.pdf --ros new", "--ros"),
+        ("calibrate camera --board board.pdf --config rig.toml", "--config"),
+        ("calibrate camera info.yaml --rows 8", "--rows"),
+        ("calibrate camera info.yaml --twin", "--twin"),
+        ("calibrate camera a.png --seconds 20", "--seconds"),
+        ("calibrate camera a.png --config rig.toml", "--config"),
+        ("calibrate camera --config rig.toml --seed 3", "--seed"),
+        ("calibrate colour a.png --page new --twin", "--twin"),
+        ("calibrate colour a.png --page new --out new", "--out"),
+        ("calibrate colour log.mcap --twin", "--twin"),
+        ("calibrate colour log.mcap --yes", "--yes"),
+        ("calibrate colour log.mcap --motors log.csv", "--motors"),
+        ("calibrate colour log.mcap --video-start 3", "--video-start"),
+        ("calibrate colour a.png --click 1,2 --click 3,4 --config rig.toml", "--config"),
+        ("calibrate colour a.png a.png --motors log.csv", "--motors"),
+        ("calibrate colour --twin --video-start 3", "--video-start"),
+        ("calibrate geometry log.mcap --seed 3", "--seed"),
+        ("calibrate geometry log.mcap --video-start 3", "--video-start"),
+        ("calibrate latency log.mcap --twin", "--twin"),
+        ("calibrate latency log.mcap --log new", "--log"),
+        ("calibrate latency log.mcap --seconds 20", "--seconds"),
+        ("calibrate latency log.mcap --config rig.toml", "--config"),
+        ("calibrate latency --twin --log new", "--log"),
+        ("calibrate latency --twin --seconds 20", "--seconds"),
+        ("calibrate latency --config rig.toml --seed 3 --yes", "--seed"),
+        ("calibrate latency --rig own_catheter:Catheter --log new", "--log"),
+        ("console --replay log.mcap --config rig.toml", "--config"),
+        ("console --replay log.mcap --profile paper", "--profile"),
+        ("console --replay log.mcap --out new", "--out"),
+        ("run --rig own_catheter:Catheter --config rig.toml --units time=ms --yes", "--units"),
+    ],
+)
+def test_an_option_without_an_effect_is_refused(
+    words: str, option: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("log.csv", "log.mcap", "info.yaml", "a.png"):
+        Path(name).write_text("t,motor,tip\n0,1,2\n1,2,3\n")
+    Path("rig.toml").write_text("")
+    assert failed(capsys, *words.split()).startswith(f"error: {option}: got ")
+    assert not Path("new").exists()
+
+
 def test_options_have_one_meaning() -> None:
     for words, parser in verbs().items():
         options = {name for action in parser._actions for name in action.option_strings}

@@ -121,6 +121,17 @@ def test_the_page_shows_the_loop(console: RunningConsole, open_page) -> None:
     assert rests(console, 0.1)
 
 
+def test_images_that_cannot_be_decoded_do_not_end_the_others(open_page) -> None:
+    """The server sends no third image before the page has taken the first."""
+    open_page(
+        script="""
+        const decode = createImageBitmap;
+        let count = 0;
+        window.createImageBitmap = (data) => (count++ < 5 ? Promise.reject() : decode(data));
+        """
+    )
+
+
 def test_keys_move_while_they_are_held(console: RunningConsole, open_page) -> None:
     page = open_page()
     page.keyboard.down("ArrowUp")  # without the lease

@@ -92,6 +92,16 @@ def rig(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str], Lines]]:
         yield file, bench, lines
 
 
+def test_a_wrong_request_is_told_and_the_next_is_served(
+    rig: tuple[Path, subprocess.Popen[str], Lines],
+) -> None:
+    _, bench, lines = rig
+    assert bench.stdin is not None
+    print("\nmelt rotation\nfreeze tail\nfreeze", file=bench.stdin)
+    print("freeze rotation", file=bench.stdin, flush=True)
+    lines.until("fault: freeze")
+
+
 MASTER = str(Path(__file__).with_name("master.py"))
 
 

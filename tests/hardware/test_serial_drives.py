@@ -48,6 +48,17 @@ def is_at_rest(motors: SimulatedMicrocontroller) -> bool:
     return all(abs(target - position) <= 1 for target, position in pairs)
 
 
+def test_a_channel_can_be_used_after_a_file_in_its_place_is_gone(tmp_path: Path) -> None:
+    config = serial_config(tmp_path)
+    channel = Path(config.channel)
+    channel.write_text("")
+    with pytest.raises(ConfigError, match="a link that can be made"):
+        SimulatedMicrocontroller(config)
+    channel.unlink()
+    with SimulatedMicrocontroller(config):
+        assert channel.is_symlink()
+
+
 def test_motors_follow_in_si_units(tmp_path: Path) -> None:
     follow_in_si_units(SimulatedMicrocontroller, serial_config(tmp_path), START)
 

@@ -12,6 +12,7 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
+from tautscope import extras
 from tautscope.config import CameraConfig, Config, RecordingConfig
 from tautscope.errors import RecordError
 from tautscope.log import header, topics
@@ -167,8 +168,10 @@ def test_a_log_is_written_with_any_package_of_opencv(monkeypatch: pytest.MonkeyP
             raise PackageNotFoundError(name)
         return "1.0"
 
-    monkeypatch.setattr(header, "version", find)
-    assert header.software_versions()["numpy"] == "1.0"
+    monkeypatch.setattr(extras, "version", find)
+    versions = header.software_versions()
+    assert versions["numpy"] == "1.0"
+    assert versions["opencv-python-headless"] == "not installed"
 
 
 def test_importing_the_package_loads_no_log_and_no_camera() -> None:

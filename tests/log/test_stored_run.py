@@ -6,18 +6,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn import DrawnRig, with_periods
+from numpy.typing import ArrayLike
 from tautscope.cli import main
 from tautscope.config import Config
 from tautscope.errors import MissingPathError, RecordError
 from tautscope.log.stored_run import read_run
 from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Sample
 from tautscope.report.recorded_run import RecordedRun
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
 
 Recorded = tuple[Path, Recording, LogSummary]
 Capture = pytest.CaptureFixture[str]
+
+
+class StoppedRig(DrawnRig):
+    """A rig of which Ctrl-C ends the run, before the first degree of freedom is done."""
+
+    STOP = 1.5
+
+    def step(self, command: ArrayLike) -> Sample:
+        sample = super().step(command)
+        if sample.time > self.STOP:
+            raise KeyboardInterrupt
+        return sample
 
 
 @pytest.fixture(scope="module")
@@ -120,19 +134,30 @@ def test_report_of_a_run_without_compensation(
 def test_report_of_a_run_without_compensation_that_was_stopped(
     capsys: Capture, pair: tuple[Path, RecordedRun], tmp_path: Path
 ) -> None:
-    folder, both = pair
+    _, both = pair
     assert both.uncompensated is not None
     # `run --compare` that is stopped before the run with compensation leaves this folder.
     stopped = tmp_path / "stopped"
-    stopped.mkdir()
-    whole = (folder / "uncompensated.mcap").read_bytes()
-    (stopped / "uncompensated.mcap").write_bytes(whole[: len(whole) // 10])
+    config = both.main.config
+    reference = SineSequence(config.experiment)
+    log = LogWriter(
+        stopped / "uncompensated.mcap",
+        config,
+        compensate=False,
+        segments=reference.segments,
+        wait=True,
+    )
+    with pytest.raises(KeyboardInterrupt), log:
+        run_experiment(StoppedRig(config), reference, config, False, log=log)
     assert main(["report", str(stopped), "--out", str(tmp_path / "out")]) == 0
     output = capsys.readouterr().out
     stored = read_run(stopped)
     assert not stored.main.segments
     count = len(stored.main.trace)
-    assert 100 < count < len(both.uncompensated.trace)
+    assert 0.9 * StoppedRig.STOP < count * config.control.period < 1.1 * StoppedRig.STOP
+    for name in stored.main.trace.dtype.names or ():
+        whole = both.uncompensated.trace[name]
+        np.testing.assert_array_equal(stored.main.trace[name], whole[:count], err_msg=name)
     # The tip is true and the run short: its second half counts.
     time, tip, reference = (
         stored.main.trace[name] for name in ("time", "true_insertion", "reference_insertion")

@@ -1,10 +1,13 @@
 """Kinematics of bending sections against an integrated curve, rotations against SciPy."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from tautscope.config import Config, from_document
+from tautscope.config import Config, from_document, to_document
 from tautscope.errors import ConfigError
 from tautscope.loop.kinematics import TwoPlanes, build_kinematics, rotation_matrix, rotation_vector
 from tautscope.loop.measurement import check_rotation
@@ -80,6 +83,16 @@ def test_a_gripper_does_not_move_the_tip(kind: str) -> None:
     expected = build_kinematics(from_document(others)).tip(np.array([0.4, -0.3]))
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_placed_kinematics_can_be_copied_and_pickled() -> None:
+    document = to_document(segments(4)) | {}
+    document["kinematics"]["base_position"] = [0.1, 0.2, 0.3]
+    placed, q = build_kinematics(from_document(document)), np.array([0.4, -0.3, 0.2, 0.1])
+    for other in (copy.copy(placed), copy.deepcopy(placed), pickle.loads(pickle.dumps(placed))):
+        for one, expected in zip(other.tip(q), placed.tip(q), strict=True):
+            np.testing.assert_array_equal(one, expected)
+    assert not hasattr(placed, "points")
 
 
 def test_segments_have_two_degrees_of_freedom_each() -> None:

@@ -1,5 +1,6 @@
 """Recordings read back equal, from files and from worker processes."""
 
+import os
 import time
 from pathlib import Path
 
@@ -111,6 +112,22 @@ def test_results_are_kept_if_the_folder_was_taken_meanwhile(is_new: bool, tmp_pa
     assert str(new) in str(found.value)
     assert (new / "mine").read_text() == "results"
     assert (folder / "mine").read_text() == "theirs"
+
+
+def test_a_file_of_two_processes_is_that_of_the_first_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "log.mcap"
+    with pytest.raises(OutputError, match="still free at the end"), new_file(target) as mine:
+        mine.write_text("first half, ")
+        monkeypatch.setattr(os, "getpid", lambda: 1)
+        with new_file(target) as theirs:
+            theirs.write_text("theirs")
+        with mine.open("a") as file:
+            file.write("second half")
+        assert mine.read_text() == "first half, second half"
+    assert target.read_text() == "theirs"
+    assert list(tmp_path.iterdir()) == [target]
 
 
 def test_commands_of_one_second_have_folders_of_their_own() -> None:

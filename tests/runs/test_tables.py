@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -34,6 +34,9 @@ DIALECTS = {
     "milliseconds": b"t [ms],motor,tip\n0,1.5,2\n1000,2.5,3\n",
     "ISO 8601": b"t,motor,tip\n2026-11-22T23:59:59.5,1.5,2\n2026-11-23T00:00:00.5,2.5,3\n",
     "ISO 8601, zone": b"t;motor;tip\n2026-11-22 10:00:00Z;1,5;2\n2026-11-22 10:00:01Z;2,5;3\n",
+    "summer time ends": b"t,motor,tip\n2026-10-25T02:59:59.5+02:00,1.5,2\n"
+    b"2026-10-25T02:00:00.5+0100,2.5,3\n",
+    "times of day, zones": b"t,motor,tip\n02:30:00+02:00,1.5,2\n00:00:01-0030,2.5,3\n",
     "time of day": b"t,motor,tip\n10:00:00.25,1.5,2\n10:00:01.25,2.5,3\n",
     "quoted decimal comma": b'"t","motor","tip"\n"0","1,5","2,0"\n"1","2,5","3,0"\n',
     "thousands and decimal comma": b"t;motor;tip\n0;1,5;2\n1;2,5;3\n",
@@ -98,10 +101,13 @@ def test_parquet_and_standard_input(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     np.testing.assert_array_equal(read_record("-", "motor", "tip").command, [1.5, 2.5])
 
 
-@pytest.mark.parametrize("kind", ["dates", "times of day", "dates and numbers", "durations"])
+@pytest.mark.parametrize(
+    "kind", ["dates", "dates in zones", "times of day", "dates and numbers", "durations"]
+)
 def test_a_tip_of_another_file_keeps_its_time(kind: str, tmp_path: Path) -> None:
     """The tip's file begins 3 s later."""
-    start = datetime(2026, 11, 22, 10, 0, 0, 250_000, UTC)
+    zone = timezone(timedelta(hours=5, minutes=30)) if kind == "dates and numbers" else UTC
+    start = datetime(2026, 11, 22, 10, 0, 0, 250_000, zone)
     stamps = [start + timedelta(seconds=k) for k in range(9)]
     motors: list[object] = [stamp.isoformat() for stamp in stamps]
     if kind == "times of day":
@@ -110,6 +116,9 @@ def test_a_tip_of_another_file_keeps_its_time(kind: str, tmp_path: Path) -> None
         motors = [stamp - datetime(2026, 1, 1, tzinfo=UTC) for stamp in stamps]
     numbers = [stamp.timestamp() for stamp in stamps]
     tips = numbers if kind == "dates and numbers" else motors
+    if kind == "dates in zones":
+        zone = timezone(timedelta(hours=-8))
+        tips = [stamp.astimezone(zone).isoformat() for stamp in stamps]
     values = [float(k * k) for k in range(9)]
     motor, tip = tmp_path / "motor.parquet", tmp_path / "tip.parquet"
     pl.DataFrame({"time": motors, "motor": values}).write_parquet(motor)

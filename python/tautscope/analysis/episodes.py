@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
@@ -56,14 +57,29 @@ def judge_all(
     if workers <= 1:
         yield from map(read, episodes)
         return
-    # Before a worker starts: its libraries read them when they are loaded.
-    os.environ |= dict.fromkeys(_THREADS, "1")
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         try:
-            yield from pool.map(read, episodes, chunksize=CHUNK)
+            with _one_thread_each():  # the workers start in `map`
+                found = pool.map(read, episodes, chunksize=CHUNK)
+            yield from found
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Let processes that start in the block use one thread: libraries read it when loaded."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ |= dict.fromkeys(_THREADS, "1")
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def judge_episode(request: Request, episode: Episode) -> list[dict[str, Any]]:

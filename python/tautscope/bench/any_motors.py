@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.bench.motors import OnCycle, SimulatedMotors
-from tautscope.bench.requests import read_requests
+from tautscope.bench.requests import serve_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
 from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
@@ -75,17 +75,15 @@ def main() -> None:
     config = load_config(arguments.config).drives
     if config is None:
         raise ConfigError("drives", None, "a section [drives]")
-    named = {motor.label: motor for motor in config.all_motors}
-    start, modes = np.array(arguments.start or [0.0] * len(named)), tuple(arguments.modes)
-    with exit_on_signals(), ExitStack() as resources:
-        with make_motors(config, resources, start=start, modes=modes) as motors:
-            printer = EventPrinter(lambda: motors.events)
-            print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-            with suppress(KeyboardInterrupt):
-                for line in read_requests():
-                    kind, label = line.split()
-                    motors.inject(kind, named[label])
-        printer.close()
+    start = np.array(arguments.start or [0.0] * len(config.all_motors))
+    with (
+        exit_on_signals(),
+        ExitStack() as resources,
+        make_motors(config, resources, start=start, modes=tuple(arguments.modes)) as motors,
+    ):
+        print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
+        with closing(EventPrinter(lambda: motors.events)):
+            serve_requests(motors.request)
 
 
 if __name__ == "__main__":

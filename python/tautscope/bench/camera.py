@@ -172,10 +172,8 @@ class CameraStream:
             connection, _ = server.accept()
         except BlockingIOError:
             return
-        if self._client is not None:
-            self._client.close()
-        camera = self._config.camera
-        self._client = _Client(connection, camera.width, camera.height, self._config)
+        self._close_client()
+        self._client = _Client(connection, self._config)
 
     def _send(self, at: float, image: NDArray[np.uint8]) -> None:
         if self._client is None:
@@ -183,13 +181,15 @@ class CameraStream:
         try:
             self._client.send(at, image)
         except (OSError, av.error.FFmpegError):  # disconnected, or too slow
+            self._close_client()
+
+    def _close_client(self) -> None:
+        if self._client is not None:
             self._client.close()
             self._client = None
 
     def _disconnect(self) -> None:
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+        self._close_client()
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -199,7 +199,7 @@ class CameraStream:
 class _Client:
     """A connection with its own NUT stream."""
 
-    def __init__(self, connection: socket.socket, width: int, height: int, config: Config) -> None:
+    def __init__(self, connection: socket.socket, config: Config) -> None:
         connection.settimeout(_SEND_TIMEOUT)
         self._connection = connection
         self._is_lost = False
@@ -208,7 +208,7 @@ class _Client:
         )
         rate = Fraction(config.twin.frame_rate).limit_denominator(1001)
         self._stream = self._container.add_stream("rawvideo", rate=rate)
-        self._stream.width, self._stream.height = width, height
+        self._stream.width, self._stream.height = config.camera.width, config.camera.height
         self._stream.pix_fmt = "bgr24"
         self._stream.time_base = self._stream.codec_context.time_base = _MICROSECOND
 

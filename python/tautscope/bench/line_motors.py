@@ -98,20 +98,24 @@ class LineMotors(SimulatedMotors):
 
     def _open(self) -> int:
         line, end = os.openpty()
+        lock = None
         try:
             tty.setraw(end)
             # The lock ends with the process; a link of one that was killed stays.
-            self._lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if self._link.is_symlink():
                 self._link.unlink()
             self._link.symlink_to(os.ttyname(end))
         except OSError as error:
             os.close(line)
+            if lock is not None:
+                os.close(lock)
             allowed = f"a link that can be made ({error}); is another bench running?"
             raise ConfigError("drives.channel", str(self._link), allowed) from None
         finally:
             os.close(end)  # so that a client's exclusive lock ends with the client
+        self._lock = lock
         os.set_blocking(line, False)
         return line
 

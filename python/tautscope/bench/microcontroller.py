@@ -40,7 +40,6 @@ class SimulatedMicrocontroller(LineMotors):
             for scale, shaft in zip(self._scales, self._start, strict=True)
         ]
         """Where the motors are [counts from home]."""
-        self._demands = [0.0] * len(self._scales)
         self._blocked: set[Motor] = set()
         speeds = {
             at: scale.speed_counts() for at, scale in zip(self._at, self._scales, strict=True)

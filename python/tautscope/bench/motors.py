@@ -67,6 +67,22 @@ class SimulatedMotors(ABC):
             raise ConfigError("fault", kind, "one of " + ", ".join(self.kinds))
         self._requests.append((kind, dof, delay))
 
+    def request(self, line: str, *, others: tuple[str, ...] = ()) -> None:
+        """Inject the fault of a line: ``freeze rotation``, ``clear rotation``.
+
+        Args:
+            line: Kind and motor.
+            others: Further parts of the bench, for the error.
+
+        Raises:
+            ConfigError: There is no such fault or motor.
+        """
+        kind, _, name = line.partition(" ")
+        named = {dof.label: dof for dof in self._config.all_motors}
+        if name not in named:
+            raise ConfigError("fault", line, "KIND " + ", KIND ".join([*named, *others]))
+        self.inject(kind, named[name])
+
     def clear(self, dof: Motor) -> None:
         """End the faults of a motor."""
         self.inject("clear", dof)

@@ -5,8 +5,21 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
+
+from tautscope.errors import ConfigError
+
+
+def serve_requests(inject: Callable[[str], None]) -> None:
+    """Inject the faults of the standard input until it ends, or Ctrl-C; print what is refused."""
+    with suppress(KeyboardInterrupt):
+        for line in read_requests():
+            try:
+                inject(line.strip())
+            except ConfigError as error:
+                print(f"error: {error}", file=sys.stderr, flush=True)
 
 
 def read_requests() -> Iterator[str]:

@@ -21,7 +21,6 @@ from tautscope.bench.camera import CameraStream, Centreline
 from tautscope.bench.events import Event
 from tautscope.bench.ground_truth import GroundTruthWriter
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.motor_rig import require_drives
 from tautscope.twin.plant import Plant
@@ -81,15 +80,12 @@ class Bench:
         Raises:
             ConfigError: There is no such fault or part.
         """
-        kind, _, part = line.strip().partition(" ")
+        kind, _, part = line.partition(" ")
         if part == CAMERA:
             self._camera.inject(kind)
             self.drives.log_event(CAMERA, f"fault: {kind}")
-            return
-        names = [dof.label for dof in Dof]
-        if part not in names:
-            raise ConfigError("fault", line.strip(), "KIND " + ", KIND ".join([*names, CAMERA]))
-        self.drives.inject(kind, Dof[part.upper()])
+        else:
+            self.drives.request(line, others=(CAMERA,))
 
     @property
     def events(self) -> list[Event]:

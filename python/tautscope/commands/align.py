@@ -13,7 +13,6 @@ from tautscope.commands.positions import (
     read_positions,
 )
 from tautscope.commands.printing import print_json
-from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate, Probe
@@ -50,8 +49,8 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.log.reader import read_log  # noqa: PLC0415
 
     check_video_options(options)
-    if options.video is None and options.config is not None:
-        raise FieldError("--config", options.config, "--video: a log has its configuration")
+    if options.video is None:
+        arguments.refuse_unused(options, "--video: a log has its configuration", "config")
     document: dict[str, Any] = {}
     if options.video is None:
         log = read_log(options.file)

@@ -108,6 +108,9 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.analysis.output import write_results  # noqa: PLC0415
 
     if options.command is None and options.measured is None:
+        of_columns = ("time", "tip_file", "missing", "update_distance", "gain", "check", "workers")
+        needed = "--command and --measured: without them the columns are listed"
+        arguments.refuse_unused(options, needed, *of_columns, "out", "config")
         _, sheet = _open(options)
         columns, pairs = list_columns(sheet)
         proposed = [{"command": command, "measured": tip} for command, tip in pairs]
@@ -128,6 +131,7 @@ def _run(options: argparse.Namespace) -> int:
         names = _names([sheet.titles[sheet.index(tip)] for tip in options.measured])
         analyze_episodes.analyze_episodes(options, episodes, names)
         return 0
+    arguments.refuse_unused(options, "no --episode", "workers")
     folder = arguments.out_folder(options)
     results = _results(options, sheet)
     settings = write_results(results, folder)

@@ -43,9 +43,8 @@ def analyze_episodes(
     )
     from tautscope.analysis.episodes_figure import episodes_figure  # noqa: PLC0415
 
-    for name in ("tip_file", "update_distance", "gain", "check", "config"):
-        if getattr(options, name):
-            options.usage_error(f"--{name.replace('_', '-')} of a data set needs --episode")
+    of_one = ("tip_file", "update_distance", "gain", "check", "config")
+    arguments.refuse_unused(options, "--episode, of a data set", *of_one)
     folder = arguments.out_folder(options)
     pairs = tuple(zip(options.command, options.measured, strict=True))
     request = Request(options.file, pairs, tuple(names), options.time, tuple(options.missing))

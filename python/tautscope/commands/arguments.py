@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeAlias, get_args
 
 from tautscope.config import RIGS, Config, Profile, load_config
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, FieldError
 from tautscope.runs.output_folder import check_free, default_folder
 
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
@@ -40,7 +40,9 @@ def add_verb(
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
     # Of itself argparse takes a negative number with an exponent for an option.
     parser._negative_number_matcher = _NEGATIVE
-    parser.set_defaults(run=run, extras=tuple(extras), usage_error=parser.error)
+    parser.set_defaults(
+        run=run, extras=tuple(extras), usage_error=parser.error, default_of=parser.get_default
+    )
     add_verbose(parser, default=argparse.SUPPRESS)
     return parser
 
@@ -54,6 +56,24 @@ def add_verbose(parser: argparse.ArgumentParser, default: int | str = 0) -> None
         default=default,
         help="print what is done; -vv prints details",
     )
+
+
+def refuse_unused(options: argparse.Namespace, allowed: str, *names: str) -> None:
+    """Refuse options that would have no effect.
+
+    Args:
+        options: Of a verb.
+        allowed: What they need beside them, for the error.
+        names: Their attributes; a verb may lack some.
+
+    Raises:
+        FieldError: One of them has another value than by default.
+    """
+    for name in names:
+        value = getattr(options, name, None)
+        if value != options.default_of(name):
+            shown = str(value) if isinstance(value, Path) else value
+            raise FieldError(f"--{name.replace('_', '-')}", shown, allowed)
 
 
 def add_config(

@@ -8,12 +8,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.bench.events import EventPrinter
-from tautscope.bench.requests import read_requests
+from tautscope.bench.requests import serve_requests
 from tautscope.commands import arguments
+from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.signals import exit_on_signals
@@ -85,6 +87,8 @@ def _bench(options: argparse.Namespace) -> None:
     )
 
     config = arguments.article_config(options.config)
+    if config.drives is not None and config.drives.protocol in SERIAL_PORTS:
+        arguments.refuse_unused(options, "CiA 402 drives, in --config", "modes")
     if options.truth is not None and options.truth.is_file():
         raise OutputError("--truth", str(options.truth), "a file that does not exist yet")
     if options.drawn is not None:
@@ -101,24 +105,17 @@ def _bench(options: argparse.Namespace) -> None:
         if refusal:
             print(f"warning: {refusal}", file=sys.stderr, flush=True)
         print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-        printer = EventPrinter(lambda: bench.events)
         stopping = threading.Event()
         injector = threading.Thread(
             target=_inject_faults, args=(bench, sorted(options.faults), stopping)
         )
         injector.start()
-        try:
-            for line in read_requests():
-                try:
-                    bench.request(line)
-                except ConfigError as error:
-                    print(f"error: {error}", file=sys.stderr, flush=True)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            stopping.set()
-            injector.join()
-            printer.close()
+        with closing(EventPrinter(lambda: bench.events)):
+            try:
+                serve_requests(bench.request)
+            finally:
+                stopping.set()
+                injector.join()
 
 
 def _check_faults(bench: Bench, faults: Iterable[tuple[float, str]]) -> None:

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibrate_camera import add_board_options
-from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits, twin_seed
+from tautscope.commands.calibration_rig import (
+    add_rig_options,
+    check_rig_options,
+    refuse_wrong_limits,
+    twin_seed,
+)
 from tautscope.commands.calibration_session import CalibrationSession
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
@@ -54,6 +59,9 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
 
+    check_rig_options(options)
+    if options.twin:
+        arguments.refuse_unused(options, "the live camera, whose time limit it is", "seconds")
     config = arguments.article_config(options.config)
     seed = options.seed = twin_seed(options, config) if options.twin else None
     if not options.twin:
@@ -63,6 +71,9 @@ def _run(options: argparse.Namespace) -> int:
     if not session.state.done:
         check_free(session.folder)
     else:
+        if folder.absolute() != session.folder:
+            resumed = f"{session.folder}, that of the sequence that is resumed; or --restart"
+            arguments.refuse_unused(options, resumed, "out")
         _say(f"Resumed; done: {', '.join(session.state.done)}. Folder: {session.folder}")
     for number, step in enumerate(STEPS, 1):
         if step.name in session.state.done:

@@ -12,7 +12,7 @@ from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_twin, twin_seed
+from tautscope.commands.calibration_rig import add_twin, check_rig_options, twin_seed
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 from tautscope.runs.output_folder import check_free_file, new_file
@@ -87,18 +87,26 @@ def _run(options: argparse.Namespace) -> None:
     if options.board is not None:
         from tautscope.calibration.camera.board import Board  # noqa: PLC0415
 
+        if options.files:
+            raise FieldError("--board", str(options.board), "no files beside it")
+        of_images = ("model", "seconds", "ros", "twin", "seed", "config", "write", "out")
+        arguments.refuse_unused(options, "no --board, which calibrates nothing", *of_images)
         board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
         print_json(options, {"file": str(options.board)})
         print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
         return
-    check_options(options)
+    is_imported = len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml")
+    if is_imported:
+        arguments.refuse_unused(options, "images of a board", "columns", "rows", "square", "model")
+    if options.files or options.twin:
+        arguments.refuse_unused(options, "the live camera, whose time limit it is", "seconds")
+    check_rig_options(options, is_motion=not options.files)
+    check_options(options, reads_config=not options.files)
     if options.ros is not None:
         check_free_file(options.ros)
-    if len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml"):
+    if is_imported:
         result, info = _import(options.files[0])
-    elif options.files and options.twin:
-        raise FieldError("--twin", True, "files or --twin, not both")
     else:
         result, info = calibrate(options, options.files)
     finish(options, result)

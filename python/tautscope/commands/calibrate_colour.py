@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.commands.calibration_rig import (
+    add_rig_options,
+    check_rig_options,
+    rig_for_calibration,
+)
 from tautscope.commands.printing import print_json, progress_bar
-from tautscope.commands.recorded_motion import add_motor_options, read_motion
+from tautscope.commands.recorded_motion import (
+    add_motor_options,
+    check_motor_options,
+    read_motion,
+)
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -70,19 +78,25 @@ def _pixel(text: str) -> tuple[int, int]:
 def _run(options: argparse.Namespace) -> None:
     files: list[Path] = options.files
     if options.page is not None:
+        of_clicks = ("click", "motors", "video_start", "twin", "seed", "yes")
+        only_page = "no --page, which calibrates nothing"
+        arguments.refuse_unused(options, only_page, *of_clicks, "config", "write", "out")
         _write_page(options, files)
         return
-    check_options(options)
+    record = files[0] if len(files) == 1 and not options.click else None
+    check_rig_options(options, is_motion=not files)
+    check_motor_options(options, record)
+    check_options(options, reads_config=record is not None or not files)
     if options.click:
         images = _clicked(files, options.click)
     elif not files:
         finish(options, calibrate(options))
         return
-    elif len(files) == 1:
+    elif record is not None:
         from tautscope.calibration.bands.motion import ImageSequence  # noqa: PLC0415
 
         allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
-        images = read_motion(options, files[0], ImageSequence, allowed)[0].label()
+        images = read_motion(options, record, ImageSequence, allowed)[0].label()
     else:
         images = _masked(files)
     finish(options, _result(images))

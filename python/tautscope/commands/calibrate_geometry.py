@@ -11,11 +11,19 @@ from typing import TYPE_CHECKING
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.commands.calibration_rig import (
+    add_rig_options,
+    check_rig_options,
+    rig_for_calibration,
+)
 from tautscope.commands.printing import print_json, progress_bar
-from tautscope.commands.recorded_motion import add_motor_options, read_motion
+from tautscope.commands.recorded_motion import (
+    add_motor_options,
+    check_motor_options,
+    read_motion,
+)
 from tautscope.config import Config
-from tautscope.errors import FieldError, RecordError
+from tautscope.errors import RecordError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,12 +73,10 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.calibration.geometry import Recorder, fit  # noqa: PLC0415
 
-    check_options(options)
     file: Path | None = options.file
-    if file is not None and options.twin:
-        raise FieldError("file", str(file), "no file together with --twin")
-    if options.motors is not None and (file is None or file.suffix == ".mcap"):
-        raise FieldError("--motors", str(options.motors), "a video together with --motors")
+    check_rig_options(options, is_motion=file is None)
+    check_motor_options(options, file)
+    check_options(options)
     serial_numbers: Mapping[str, str] = {}
     if file is None:
         recording, config, serial_numbers = move(options, camera_is_known=True)

@@ -15,6 +15,7 @@ from tautscope.commands.calibration_output import add_options, check_options, fi
 from tautscope.commands.calibration_rig import (
     ARTICLE_MOTION,
     add_rig_options,
+    check_rig_options,
     confirm_motion,
     refuse_wrong_limits,
     run_protocol,
@@ -74,10 +75,16 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.log.alignment import align_recording  # noqa: PLC0415
 
-    check_options(options)
-    if options.rig is not None:
-        if options.file is not None or options.twin:
-            raise FieldError("--rig", options.rig, "neither a file nor --twin")
+    file: Path | None = options.file
+    if options.rig is not None and (file is not None or options.twin):
+        raise FieldError("--rig", options.rig, "neither a file nor --twin")
+    check_rig_options(options, is_motion=file is None)
+    check_options(options, reads_config=file is None)
+    if file is not None or options.rig is not None or options.twin:
+        arguments.refuse_unused(options, "a motion of [drives], whose log it is", "log")
+    if options.rig is None:
+        arguments.refuse_unused(options, "--rig, whose motion it is", "seconds")
+    else:
         require_extras("--rig", ["analysis"])
         return robot_calibration.run_latency(options)
     recording, serial_numbers = _recording(options)

@@ -31,17 +31,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     arguments.add_json(parser)
 
 
-def check_options(options: argparse.Namespace) -> None:
+def check_options(options: argparse.Namespace, *, reads_config: bool = True) -> None:
     """Check before anything runs that the results can be written.
 
+    Args:
+        options: With those of `add_options`.
+        reads_config: Whether ``--config`` is more than the file of ``--write``.
+
     Raises:
-        FieldError: ``--write`` without ``--config``.
+        FieldError: ``--write`` without ``--config``, or ``--config`` without an effect.
         OutputError: The folder is taken or cannot be written.
     """
     if options.write:
         if options.config is None:
             raise FieldError("--write", True, "also --config FILE, the file to write to")
         check_writable(writable_file(options.config))
+    elif not reads_config:
+        arguments.refuse_unused(options, "also --write, or no files", "config")
     if options.out is not None:
         check_free(options.out)
 

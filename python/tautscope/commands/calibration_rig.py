@@ -67,6 +67,24 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="move the motors without asking")
 
 
+def check_rig_options(options: argparse.Namespace, *, is_motion: bool = True) -> None:
+    """Check ``--twin``, ``--seed`` and ``--yes``.
+
+    Args:
+        options: Of a calibration.
+        is_motion: Whether the rig or the twin is calibrated, and no file.
+
+    Raises:
+        FieldError: One of them has no effect.
+    """
+    if not is_motion:
+        arguments.refuse_unused(options, "no files beside it", "twin", "seed", "yes")
+    elif options.twin:
+        arguments.refuse_unused(options, "no --twin, of which no motor moves", "yes")
+    else:
+        arguments.refuse_unused(options, "--twin, whose seed it is", "seed")
+
+
 def twin_seed(options: argparse.Namespace, config: Config) -> int:
     """The seed of ``--seed``, or of the configuration."""
     return int(config.twin.seed if options.seed is None else options.seed)

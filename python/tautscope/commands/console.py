@@ -48,6 +48,8 @@ def _console(options: argparse.Namespace) -> int:
         print(f"The console of {what}: {url}\n{note} Ctrl-C ends.", flush=True)
 
     if options.replay is not None:
+        shown = "no --replay, which only shows a log"
+        arguments.refuse_unused(options, shown, "config", "profile", "robot", "out")
         require_extras("tautscope console --replay", ["hardware"])
         from tautscope.console.log_player import play  # noqa: PLC0415
 

@@ -11,7 +11,7 @@ from tautscope.commands import arguments, robot
 from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.rig_choice import add_robot, choose_rig
 from tautscope.config import DISTURBANCES, Config
-from tautscope.errors import FieldError, MissingPathError
+from tautscope.errors import MissingPathError
 from tautscope.loop.references import SineSequence
 from tautscope.runs.output_folder import recording_saved
 
@@ -80,8 +80,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.robot is not None:
         _run_robot(options)
         return
-    if options.seconds is not None:
-        raise FieldError("--seconds", options.seconds, "--robot")
+    arguments.refuse_unused(options, "--robot", "seconds")
     config = _load(options)
     folder = arguments.out_folder(options)
     first = config.twin.seed
@@ -105,11 +104,8 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _run_robot(options: argparse.Namespace) -> None:
-    for name in ("background", "disturb"):
-        if getattr(options, name) is not None:
-            raise FieldError(f"--{name}", getattr(options, name), "no --robot, which has no camera")
-    if options.seeds != 1:
-        raise FieldError("--seeds", options.seeds, "1 with --robot")
+    arguments.refuse_unused(options, "no --robot, which has no camera", "background", "disturb")
+    arguments.refuse_unused(options, "1 with --robot", "seeds")
     config, make = choose_rig(options)
     seed = options.seed or 0
     robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, seed=seed)

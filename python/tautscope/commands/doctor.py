@@ -13,7 +13,7 @@ from tautscope.commands.question import ask
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
-from tautscope.errors import ConfigError, FieldError
+from tautscope.errors import ConfigError
 from tautscope.extras import missing_modules
 from tautscope.hardware.doctor.calibration import check_calibration
 from tautscope.hardware.doctor.check_result import CheckResult
@@ -126,9 +126,8 @@ def _check_own(
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    if options.rig is None and options.yes:
-        raise FieldError("--yes", True, "--rig: without it nothing moves")
     if options.rig is None:
+        arguments.refuse_unused(options, "--rig: without it nothing moves", "yes")
         config = arguments.article_config(options.config)
         checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
     else:

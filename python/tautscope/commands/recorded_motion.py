@@ -33,6 +33,22 @@ def add_motor_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def check_motor_options(options: argparse.Namespace, file: Path | None) -> None:
+    """Check that ``--motors`` and ``--video-start`` belong to a video.
+
+    Args:
+        options: With those of `add_motor_options`.
+        file: A log or a video; None without a record.
+
+    Raises:
+        FieldError: They have no effect.
+    """
+    if file is None or file.suffix == ".mcap":
+        arguments.refuse_unused(options, "a video together with --motors", "motors")
+    if options.motors is None:
+        arguments.refuse_unused(options, "a video with --motors", "video_start")
+
+
 def read_motion(
     options: argparse.Namespace,
     file: Path,

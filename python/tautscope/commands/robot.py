@@ -49,6 +49,7 @@ def run(
     """
     from tautscope.log.writer import run_log  # noqa: PLC0415
 
+    arguments.refuse_unused(options, "--reference, and no --rig", "units")
     folder = arguments.out_folder(options)
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import threading
 import time
@@ -19,6 +20,7 @@ from tautscope.loop.construction import build_feature_model
 from tautscope.loop.rig import Frame
 
 Floats = NDArray[np.float64]
+_LOG = logging.getLogger(__name__)
 _LOG_PERIOD = 1.0
 """Time between two looks at the size of the log and at the free disk [s]."""
 
@@ -70,6 +72,7 @@ class Publisher:
         log: Size of the log and remaining time, renewed each second.
         log_path: The log; None before there is one.
         image: The newest image.
+        failure: Why the newest image is not shown; empty if it is.
     """
 
     def __init__(self, config: Config, channel: ImageChannel) -> None:
@@ -78,6 +81,7 @@ class Publisher:
         self._channel = channel
         self._next: Update | None = None
         self.image: NDArray[np.uint8] | None = None
+        self.failure = ""
         self._wake = threading.Event()
         self._is_closing = False
         self.log = LogState()
@@ -105,10 +109,21 @@ class Publisher:
             self._wake.clear()
             update, self._next = self._next, None
             if update is not None:
-                self._channel.write(update.frame.image, self._overlay(update))
+                self._show(update)
             if time.monotonic() - checked >= _LOG_PERIOD:
                 checked = time.monotonic()
                 self._check_log(checked)
+
+    def _show(self, update: Update) -> None:
+        try:
+            self._channel.write(update.frame.image, self._overlay(update))
+        except Exception as error:  # the next one may be shown
+            failure = f"No image is shown: {type(error).__name__}: {error}"
+            if failure != self.failure:
+                _LOG.warning("%s", failure)
+            self.failure = failure
+        else:
+            self.failure = ""
 
     def _overlay(self, update: Update) -> Overlay:
         overlay = Overlay(update.sequence, update.arrived_at, *self._size)

@@ -89,8 +89,11 @@ class Server:
             "ping_timeout": 5.0,
             "server_header": None,
         }
-        async with serve(self._handle, **address, **options) as server:
-            feeding = [asyncio.create_task(feed.run()) for feed in (self._states, self._images)]
+        async with (
+            serve(self._handle, **address, **options) as server,
+            asyncio.TaskGroup() as group,  # an error of a feed ends the server
+        ):
+            feeding = [group.create_task(feed.run()) for feed in (self._states, self._images)]
             try:
                 yield server
             finally:

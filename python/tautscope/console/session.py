@@ -134,4 +134,6 @@ class Session:
         if self._control.config.dof:
             self._control.images.add(now)
         state = session_state(self._control, self._publisher.log, now)
+        if failure := self._publisher.failure:
+            state.message = f"{state.message} {failure}"[: msg.LONGEST_REASON]
         self._channels.state.write(msg.encode(state))

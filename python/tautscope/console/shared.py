@@ -99,9 +99,8 @@ class ImageChannel:
 
     def write(self, image: Image, overlay: Overlay) -> None:
         """Write an image."""
-        self._number += 1
-        np.copyto(self._pixels[self._number % _IMAGES], image)
-        self._info.write(self._encode(overlay))
+        np.copyto(self._pixels[(self._number + 1) % _IMAGES], image)
+        self._number = self._info.write(self._encode(overlay))
 
     def newest(self) -> tuple[Image, Overlay] | None:
         """A copy of the newest image, if it was not read before.

@@ -7,13 +7,13 @@ import platform
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 
 import tomlkit
 
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config, from_document
 from tautscope.errors import ConfigError, RecordError
+from tautscope.extras import installed_version
 from tautscope.log import topics
 from tautscope.log.fields import camera_info
 from tautscope.loop.references import Segment
@@ -48,15 +48,8 @@ def software_versions() -> dict[str, str]:
         "tautscope": __version__,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
-        **{name: _version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
+        **{name: installed_version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:  # OpenCV has several packages
-        return "not installed"
 
 
 def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:

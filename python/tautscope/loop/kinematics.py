@@ -101,6 +101,8 @@ class Placed:
         self._sensor = rotation_matrix(np.array(config.sensor_rotation))
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # copies and pickles ask for these before there is a kinematics
+            raise AttributeError(name)
         return getattr(self._kinematics, name)
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tautscope._core import __version__
 from tautscope.config import Config
+from tautscope.extras import installed_version
 from tautscope.report import report, tables
 from tautscope.report.operator_motion import (
     OPERATOR_ROWS,
@@ -260,7 +260,7 @@ def demo_report(demo: Demo, figures: Iterable[tuple[Figure, str]], film: bytes) 
     facts = {
         "tautscope": __version__,
         "Python": platform.python_version(),
-        **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
+        **{name: installed_version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
         "machine": f"{platform.system()} {platform.machine()}",
         "seeds": ", ".join(map(str, seeds)),
         "simulated": f"{demo.sim_seconds:.0f} s in {(3 + len(profiles)) * len(seeds)} runs",
@@ -288,10 +288,3 @@ Widths over the last two periods of each degree of freedom: mean over 41 levels 
         facts,
         demo.config,
     )
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"

@@ -34,7 +34,7 @@ def numbers(
     import polars as pl  # noqa: PLC0415
 
     if series.dtype.is_temporal():
-        return _seconds(series)
+        return _seconds(_nanoseconds(series))
     if series.dtype == pl.String:
         text = series.str.strip_chars().str.strip_chars('"').str.strip_chars()
         values = _with_decimal_point(text).cast(pl.Float64, strict=False)
@@ -72,7 +72,10 @@ def _with_decimal_point(text: pl.Series) -> pl.Series:
 
 
 def _times(text: pl.Series) -> pl.Series | None:
-    """Texts as dates or times of day, ISO 8601 or as people write them; None if one is neither."""
+    """Dates or times of day [ns], ISO 8601 or as people write them; None if a text is neither.
+
+    Those without a time zone count as UTC.
+    """
     import polars as pl  # noqa: PLC0415
 
     plain = (
@@ -80,27 +83,36 @@ def _times(text: pl.Series) -> pl.Series | None:
         .str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
         .str.replace("T", " ", literal=True)
     )
+    zone = text.str.extract(r"([+-]\d\d:?\d\d)$").str.replace(":", "", literal=True)
+    hhmm = zone.cast(pl.Int64, strict=False).fill_null(0)
+    minutes = hhmm.sign() * (hhmm.abs() // 100 * 60 + hhmm.abs() % 100)
     given = text.is_not_null() & (text != "")
     readers = [
         partial(plain.str.strptime, pl.Datetime("ns"), f"{date} {clock}", strict=False)
         for date in _DATES
         for clock in _CLOCKS
     ] + [partial(plain.str.strptime, pl.Time, clock, strict=False) for clock in _CLOCKS]
-    return next(
-        (found for read in readers if ((found := read()).is_not_null() == given).all()), None
-    )
+    for read in readers:
+        if ((found := read()).is_not_null() == given).all():
+            return _nanoseconds(found) - minutes * 60_000_000_000
+    return None
 
 
-def _seconds(times: pl.Series) -> tuple[Floats, int]:
-    """Seconds since the first time, NaN where there is none; and the first time [ns]."""
+def _nanoseconds(times: pl.Series) -> pl.Series:
+    """Dates, times of day or durations as whole numbers [ns]."""
     import polars as pl  # noqa: PLC0415
 
     if times.dtype == pl.Duration:
-        ticks = times.dt.total_nanoseconds()
-    elif times.dtype == pl.Time:
-        ticks = times.cast(pl.Int64)
-    else:
-        ticks = times.cast(pl.Datetime("ns")).cast(pl.Int64)
+        return times.dt.total_nanoseconds()
+    if times.dtype == pl.Time:
+        return times.cast(pl.Int64)
+    return times.cast(pl.Datetime("ns")).cast(pl.Int64)
+
+
+def _seconds(ticks: pl.Series) -> tuple[Floats, int]:
+    """Seconds since the first time, NaN where there is none; and the first time [ns]."""
+    import polars as pl  # noqa: PLC0415
+
     known = ticks.drop_nulls()
     first = int(known[0]) if len(known) else 0
     seconds = ((ticks - first).cast(pl.Float64) / 1e9).fill_null(float("nan"))

@@ -73,14 +73,21 @@ def new_file(path: str | PathLike[str]) -> Iterator[Path]:
         OutputError: The path is taken, or cannot be written.
     """
     target = check_free_file(path)
-    partial = target.with_name(f".{target.name}.partial")
+    partial = _beside(target)
     try:
         yield partial
+        if target.exists():
+            raise OutputError("out", str(target), "still free at the end")
         partial.rename(target)
     except OSError as error:
         raise _as_output(error, target, partial) from None
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _beside(target: Path) -> Path:
+    """A path for the time until an output is complete, of this process alone."""
+    return target.with_name(f".{target.name}.{os.getpid()}.partial")
 
 
 def _as_output(error: OSError, target: Path, partial: Path) -> OSError | OutputError:
@@ -109,7 +116,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
     """
     target = check_free(path).resolve()
     is_new = not target.exists()
-    partial = (target.parent if is_new else target) / f".{target.name}.{os.getpid()}.partial"
+    partial = _beside(target) if is_new else target / _beside(target).name
     try:
         partial.mkdir(parents=True)
     except OSError as error:

@@ -54,7 +54,7 @@ def read_camera_info(path: Path) -> Intrinsics:
     if not path.is_file():
         raise MissingPathError("camera_info", str(path), "a ROS camera_info file (YAML)")
     document = _document(path)
-    width, height = (_number(path, document, f"image_{side}", side) for side in ("width", "height"))
+    width, height = (_count(path, document, f"image_{side}", side) for side in ("width", "height"))
     matrix = _numbers(path, document, "camera_matrix", "k")
     if len(matrix) != 9:
         raise FieldError(f"{path}: camera_matrix", len(matrix), "9 numbers")
@@ -74,7 +74,7 @@ def read_camera_info(path: Path) -> Intrinsics:
     fx, skew, cx, _, fy, cy = matrix[:6]
     if abs(skew) > (_SKEW * fx if model == "fisheye" else 0) or not (fx > 0 and fy > 0):
         raise FieldError(f"{path}: camera_matrix", matrix, "focal lengths above 0 and no skew")
-    return Intrinsics((int(width), int(height)), model, (fx, fy), (cx, cy), tuple(coefficients))
+    return Intrinsics((width, height), model, (fx, fy), (cx, cy), tuple(coefficients))
 
 
 def _document(path: Path) -> dict[str, Any]:
@@ -106,11 +106,11 @@ def _matrix(name: str, rows: int, columns: int, values: Sequence[float]) -> str:
     return f"{name}:\n  rows: {rows}\n  cols: {columns}\n  data: [{data}]\n"
 
 
-def _number(path: Path, document: dict[str, Any], *names: str) -> float:
+def _count(path: Path, document: dict[str, Any], *names: str) -> int:
     value = next((document[name] for name in names if name in document), None)
-    if not _is_number(value) or not value >= 1:
-        raise FieldError(f"{path}: {names[0]}", value, "a number, at least 1")
-    return float(value)
+    if not _is_number(value) or value < 1 or value % 1:
+        raise FieldError(f"{path}: {names[0]}", value, "a whole number, at least 1")
+    return int(value)
 
 
 def _numbers(path: Path, document: dict[str, Any], *names: str) -> list[float]:

@@ -37,6 +37,7 @@ export class ImageView {
       try {
         bitmap = await createImageBitmap(blob);
       } catch {
+        this.onDrawn(overlay.sequence, this.shownWidth); // or the server would wait for it
         continue;
       }
       await new Promise((resolve) => requestAnimationFrame(resolve));
