@@ -68,7 +68,7 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
 
 
 def check_rig_options(options: argparse.Namespace, *, is_motion: bool = True) -> None:
-    """Check ``--twin``, ``--seed`` and ``--yes``.
+    """Check ``--twin`` and ``--seed``; ``--yes`` may answer a question that is not asked.
 
     Args:
         options: Of a calibration.
@@ -78,10 +78,8 @@ def check_rig_options(options: argparse.Namespace, *, is_motion: bool = True) ->
         FieldError: One of them has no effect.
     """
     if not is_motion:
-        arguments.refuse_unused(options, "no files beside it", "twin", "seed", "yes")
-    elif options.twin:
-        arguments.refuse_unused(options, "no --twin, of which no motor moves", "yes")
-    else:
+        arguments.refuse_unused(options, "no files beside it", "twin", "seed")
+    elif not options.twin:
         arguments.refuse_unused(options, "--twin, whose seed it is", "seed")
 
 
