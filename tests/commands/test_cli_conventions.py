@@ -94,6 +94,9 @@ def verbs() -> dict[str, argparse.ArgumentParser]:
         ("console --replay log.mcap --config rig.toml", "--config"),
         ("console --replay log.mcap --profile paper", "--profile"),
         ("console --replay log.mcap --out new", "--out"),
+        ("ros2 --twin --axes 0 1 2", "--axes"),
+        ("ros2 --twin --button 3", "--button"),
+        ("ros2 --twin --listen tcp/127.0.0.1:7447 --connect tcp/127.0.0.1:7448", "--connect"),
         ("run --rig own_catheter:Catheter --config rig.toml --units time=ms --yes", "--units"),
     ],
 )

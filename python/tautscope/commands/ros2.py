@@ -91,6 +91,10 @@ def _ros2(options: argparse.Namespace) -> int:
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
 
+    if options.device != "joy":
+        arguments.refuse_unused(options, "--device joy", "axes", "button")
+    if options.listen is not None:
+        arguments.refuse_unused(options, "no --listen, which needs no router", "connect")
     if options.driver and options.robot is None:
         config, make_rig = load_config(options.config, options.profile), None
     else:
