@@ -2,9 +2,22 @@
 
 mod support;
 
+use fearless_simd::Level;
 use proptest::prelude::*;
-use support::{Memory, memory, weights};
-use tautscope_vision::{ColorDiscriminant, Segmenter, Window};
+use support::{Memory, format, memory, weights};
+use tautscope_vision::{ColorDiscriminant, Image, Segmenter, Window};
+
+/// Instruction sets to test: the best of this machine, the next that multiplies bytes in pairs, and the least.
+fn levels() -> impl Iterator<Item = Level> {
+    let best = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let narrower = best.as_avx2().map(fearless_simd::Simd::level);
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let narrower = None;
+    [Some(best), narrower, Some(Level::baseline())]
+        .into_iter()
+        .flatten()
+}
 
 /// The marker pixels by row of the window; checks that the row after one with some is visited.
 fn segmented(
@@ -79,14 +92,42 @@ proptest! {
         let Ok(discriminant) = ColorDiscriminant::new(weights, threshold) else {
             return Ok(());
         };
-        let mut segmenter = Segmenter::new(discriminant, passes);
-        for memory in &memories {
-            let mask = memory.mask(weights, threshold, passes);
-            let whole = Window::whole(&memory.frame());
-            for window in [whole, window] {
-                let found = segmented(&mut segmenter, memory, window);
-                prop_assert_eq!(found, expected(&mask, window), "{:?}", window);
+        let masks = memories.iter().map(|memory| memory.mask(weights, threshold, passes));
+        let masks: Vec<_> = masks.collect();
+        for level in levels() {
+            let mut segmenter = Segmenter::new(discriminant, passes).with_level(level);
+            for (memory, mask) in memories.iter().zip(&masks) {
+                let whole = Window::whole(&memory.frame());
+                for window in [whole, window] {
+                    let found = segmented(&mut segmenter, memory, window);
+                    prop_assert_eq!(found, expected(mask, window), "{:?} {:?}", level, window);
+                }
             }
+        }
+    }
+
+    #[test]
+    fn rows_far_from_a_marker_pixel_are_not_visited(
+        format in format(),
+        (half_width, half_height) in (128..300_usize, 30..100_usize),
+        (u, v) in any::<(prop::sample::Index, prop::sample::Index)>(),
+        passes in 0..9_usize,
+    ) {
+        let (width, height) = (2 * half_width, 2 * half_height);
+        let (u, v) = (u.index(width), v.index(height));
+        let (depth, stride) = (format.depth(), format.line_bytes(width));
+        // Grey, and one pixel that is brighter.
+        let mut data = vec![128; stride * format.lines(height)];
+        data[v * stride + depth * u..][..depth].fill(255);
+        let frame = Image::new(&data, format, [width, height], stride).unwrap();
+        let discriminant = ColorDiscriminant::new([1.0; 3], 700.0).unwrap();
+        for level in levels() {
+            let mut segmenter = Segmenter::new(discriminant, passes).with_level(level);
+            let mut visited = Vec::new();
+            segmenter.each_row(&frame, |row, _| visited.push(row));
+            prop_assert!(passes > 0 || visited.contains(&v), "{:?}: {}", level, v);
+            let is_near = |row: &usize| row.abs_diff(v) <= 3 * passes + 1;
+            prop_assert!(visited.iter().all(is_near), "{:?}: {} {:?}", level, v, visited);
         }
     }
 }

@@ -44,6 +44,12 @@ impl Segmenter {
         }
     }
 
+    /// With the instructions of a level in place of the best ones of this processor.
+    #[must_use]
+    pub fn with_level(self, level: Level) -> Self {
+        Self { level, ..self }
+    }
+
     /// Calls `visit(v, runs)`, top to bottom, for every row that has marker pixels and the row after it, and for some
     /// others.
     ///
