@@ -62,17 +62,16 @@ impl Patch {
         let count = self.columns * (rows.len() / step);
         self.differences.clear();
         self.differences.resize(count, [0.0; 2]);
-        let format = frame.format();
         let share = 1.0 / (self.step * self.step);
-        let channels = DIFFERENCES.map(|weights| Affine::new(weights.map(|w| share * w), format));
-        let groups = format.whole_groups(columns.clone());
+        let channels =
+            DIFFERENCES.map(|weights| Affine::new(weights.map(|w| share * w), frame.format()));
         let means = self.differences.chunks_mut(self.columns.max(1));
         for (row, into) in means.enumerate() {
             for v in (0..step).map(|offset| rows.start + row * step + offset) {
-                let pixels = Row::of(frame, v, groups.clone());
+                let pixels = Row::of(frame, v);
                 for (u, sums) in (columns.clone()).step_by(step).zip(&mut *into) {
                     for u in u..u + step {
-                        let pixel = pixels.pixel(u - groups.start);
+                        let pixel = pixels.pixel(u);
                         for (sum, channel) in sums.iter_mut().zip(&channels) {
                             *sum += single(channel.of(pixel));
                         }
@@ -160,60 +159,5 @@ impl Patch {
             self.origin[0] + u * self.step,
             self.origin[1] + v * self.step,
         ]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recognition::OUTLINE_CORNERS as CORNERS;
-    use crate::scan::{Image, PixelFormat};
-
-    /// B, G, R of tissue, of grey plastic and of a band; tissue is red: green minus red is below 0.
-    const TISSUE: [u8; 3] = [40, 60, 160];
-    const GREY: [u8; 3] = [90, 90, 90];
-    const BAND: [u8; 3] = [50, 180, 60];
-
-    #[test]
-    fn green_is_proportional_to_the_share_of_the_band_in_a_mixture() {
-        // 16 columns each of tissue, grey, half tissue and half grey, band, and a quarter of band in tissue.
-        let quarter = [0, 1, 2].map(|i| (BAND[i] / 4) + 3 * (TISSUE[i] / 4));
-        let half = [0, 1, 2].map(|i| TISSUE[i] / 2 + GREY[i] / 2);
-        let fields = [TISSUE, GREY, half, BAND, quarter];
-        let (width, height) = (16 * fields.len(), 16);
-        let row = fields.iter().flat_map(|field| field.repeat(16));
-        let data = row.collect::<Vec<u8>>().repeat(height);
-        let frame = Image::new(&data, PixelFormat::Bgr, [width, height], 3 * width).unwrap();
-        // Only the tissue on the left is outside the outline.
-        let corner = |index: usize| {
-            let share = real(index % (CORNERS / 2)) / real(CORNERS / 2 - 1);
-            let along = 15.5
-                + 70.0
-                    * if index < CORNERS / 2 {
-                        share
-                    } else {
-                        1.0 - share
-                    };
-            [along, if index < CORNERS / 2 { -1.0 } else { 17.0 }]
-        };
-        let outline = Outline {
-            corners: std::array::from_fn(corner),
-            centroid: [50.5, 8.0],
-            area: 70.0 * 18.0,
-        };
-        let mut patch = Patch::default();
-        patch.read(&frame, 0..width, 0..height, 1);
-        patch.remove_tissue_colour(&[outline; 2]);
-        let at = |u: f64| {
-            let index = (0..patch.green.len()).find(|index| {
-                let [column, _] = patch.coordinates(*index);
-                column >= u
-            });
-            patch.green[index.unwrap()]
-        };
-        let [tissue, grey, half, band, quarter] = [4.0, 20.0, 36.0, 52.0, 68.0].map(at);
-        assert!(tissue.abs() < 0.01 && grey.abs() < 0.01 && half.abs() < 0.5);
-        assert!(band > 50.0, "{band}");
-        assert!((quarter / band - 0.25).abs() < 0.02, "{quarter} of {band}");
     }
 }

@@ -30,7 +30,7 @@ pub use frame::{Frame, Image, Window};
 pub use regions::{Labeller, Region};
 pub(crate) use row::Row;
 pub(crate) use run_map::RunMap;
-pub use runs::{Runs, each_run};
+pub use runs::Runs;
 pub use scanner::MAX_REGIONS;
 pub(crate) use scanner::{Regions, Scanner};
 pub use segment::Segmenter;
