@@ -78,7 +78,7 @@ impl Mask {
     }
 
     /// Convolves the mask with a normal density of standard deviation `sigma` (samples), cut at 3 sigma.
-    pub fn blur(&mut self, sigma: f64, columns: usize, buffer: &mut Vec<f32>) {
+    pub fn blur(&mut self, sigma: f64, columns: usize, Self { coverage: buffer }: &mut Self) {
         let mut kernel = [0.0_f32; SIDE / 2];
         let reach = floor((3.0 * sigma).ceil()).clamp(1, kernel.len() - 1);
         let mut sum = 0.0;

@@ -108,17 +108,11 @@ impl Affine {
 
     /// The largest magnitude of the weighted sum over all bytes; at least half of the range of a channel.
     fn reach(&self) -> f64 {
-        let side = |sign: f64| {
-            self.weights
-                .iter()
-                .map(|w| (sign * w).max(0.0))
-                .sum::<f64>()
+        let extreme = |sign: f64| {
+            let side: f64 = self.weights.iter().map(|w| (sign * w).max(0.0)).sum();
+            (self.constant + sign * 255.0 * side).abs()
         };
-        let (most, least) = (
-            self.constant + 255.0 * side(1.0),
-            self.constant - 255.0 * side(-1.0),
-        );
         let half = self.weights.iter().fold(0.0, |most, w| w.abs().max(most)) * 128.0;
-        most.abs().max(least.abs()).max(half)
+        extreme(1.0).max(extreme(-1.0)).max(half)
     }
 }
