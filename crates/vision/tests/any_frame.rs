@@ -147,4 +147,15 @@ fn invalid_settings_are_rejected_by_name() {
         }),
         "minimum_area"
     );
+    let black = vec![([0.0; 3], 0.0)];
+    let mut settings = SETTINGS;
+    settings.unlocated.alternatives.clone_from(&black);
+    assert_eq!(rejected(settings), "unlocated.alternatives");
+    assert_eq!(
+        rejected(Settings {
+            alternatives: black,
+            ..SETTINGS
+        }),
+        "alternatives"
+    );
 }
