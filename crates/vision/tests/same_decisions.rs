@@ -5,7 +5,7 @@ mod support;
 use fearless_simd::Level;
 use proptest::prelude::*;
 use support::{Memory, format, memory, weights};
-use tautscope_vision::{ColorDiscriminant, Image, Segmenter, Window};
+use tautscope_vision::{ColorDiscriminant, Image, PixelFormat, Segmenter, Window};
 
 /// Instruction sets to test: the best of this machine, the next that multiplies bytes in pairs, and the least.
 fn levels() -> impl Iterator<Item = Level> {
@@ -129,5 +129,23 @@ proptest! {
             let is_near = |row: &usize| row.abs_diff(v) <= 3 * passes + 1;
             prop_assert!(visited.iter().all(is_near), "{:?}: {} {:?}", level, v, visited);
         }
+    }
+}
+
+#[test]
+fn a_pixel_whose_coarse_sum_is_the_coarse_level_is_found() {
+    // In fixed point the sum of this pixel is 150 in the coarse scan, and so is the level.
+    let (width, pixel) = (256, 70);
+    let mut data = vec![0; 3 * width];
+    data[3 * pixel + 1] = 2;
+    let frame = Image::new(&data, PixelFormat::Bgr, [width, 1], 3 * width).unwrap();
+    let discriminant = ColorDiscriminant::new([-0.5, 0.3, 0.2], 0.599).unwrap();
+    for level in levels() {
+        let mut found = Vec::new();
+        let mut segmenter = Segmenter::new(discriminant, 0).with_level(level);
+        segmenter.each_row(&frame, |_, runs| {
+            runs.each(|start, end| found.push((start, end)));
+        });
+        assert_eq!(found, [(pixel, pixel + 1)], "{level:?}");
     }
 }
