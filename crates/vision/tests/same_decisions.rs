@@ -77,7 +77,7 @@ fn threshold(memory: &Memory, weights: [f64; 3], pick: usize, shift: f64) -> f64
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn marker_pixels_are_those_of_the_definitions(

@@ -120,3 +120,7 @@ fn widen(row: &mut [u64], blocks: usize) {
         *last &= u64::MAX >> ((64 - blocks % 64) % 64);
     }
 }
+
+#[cfg(test)]
+#[path = "../../tests/units/active_blocks.rs"]
+mod tests;
