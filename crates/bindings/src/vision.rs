@@ -15,7 +15,7 @@ use tautscope_band_prediction::{ModelPredictor, Prior, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{
     ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat, Segmenter,
-    Settings, Window, each_run,
+    Settings, Window,
 };
 
 use crate::arrays::table;
@@ -198,12 +198,14 @@ pub fn label_regions<'py>(
         let mut regions = Vec::new();
         labeller.start(width);
         for (v, row) in mask.outer_iter().enumerate() {
-            let row = row.to_vec();
-            each_run(
-                &row,
-                |inside| *inside,
-                |start, end| labeller.add(v, start, end),
-            );
+            let mut start = 0;
+            for run in row.to_vec().chunk_by(|one, next| one == next) {
+                let end = start + run.len();
+                if run[0] {
+                    labeller.add(v, start, end);
+                }
+                start = end;
+            }
             labeller.end_row(|region| regions.push(region));
         }
         labeller.end_row(|region| regions.push(region));

@@ -33,9 +33,14 @@ impl Detector {
             settings.weights,
             settings.threshold,
         )?];
-        let alternatives = &settings.alternatives;
-        for (weights, threshold) in alternatives.iter().chain(&settings.unlocated.alternatives) {
-            discriminants.push(ColorDiscriminant::new(*weights, *threshold)?);
+        for (field, alternatives) in [
+            ("alternatives", &settings.alternatives),
+            ("unlocated.alternatives", &settings.unlocated.alternatives),
+        ] {
+            for (weights, threshold) in alternatives {
+                let discriminant = ColorDiscriminant::new(*weights, *threshold);
+                discriminants.push(discriminant.map_err(|error| Error { field, ..error })?);
+            }
         }
         Ok(Self {
             unlocated: settings.unlocated(),

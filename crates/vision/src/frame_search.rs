@@ -237,7 +237,7 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
             let regions = self.memory.scanner.regions;
             found.or_better(Found { bands, regions }, self.settings)
         });
-        let is_blurred = fit.is_blurred(&self.settings.blur);
+        let is_blurred = fit.sigma > self.settings.blur.sharp_sigma;
         if edges.is_complete() && (!is_blurred || edges.bands.is_clear(self.settings)) {
             return edges;
         }

@@ -9,9 +9,6 @@
 // Kernels are compiled once for each instruction set, which they are only if they are inlined.
 #![allow(clippy::inline_always)]
 
-#[cfg(test)]
-extern crate self as tautscope_vision;
-
 mod blur;
 mod detector;
 mod error;
@@ -29,6 +26,6 @@ pub use recognition::{
 };
 pub use scan::{
     ColorDiscriminant, Frame, Image, Labeller, MAX_REGIONS, MAX_SIDE, PixelFormat, Region, Runs,
-    Segmenter, Window, each_run,
+    Segmenter, Window,
 };
 pub use settings::{BlurSettings, ClearSettings, FitSettings, Settings, UnlocatedSettings};

@@ -34,6 +34,16 @@ pub fn apply<const N: usize>(matrix: &Square<N>, vector: [f64; N]) -> [f64; N] {
     matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
 }
 
+/// `one` minus `other`.
+pub fn difference(one: [f64; 4], other: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|index| one[index] - other[index])
+}
+
+/// u, v of both bands.
+pub fn points([ua, va, ub, vb]: [f64; 4]) -> [[f64; 2]; 2] {
+    [[ua, va], [ub, vb]]
+}
+
 /// x' M x.
 pub fn quadratic<const N: usize>(matrix: &Square<N>, vector: [f64; N]) -> f64 {
     apply(matrix, vector)

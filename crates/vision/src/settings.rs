@@ -1,12 +1,10 @@
 //! Settings of the detector. `VisionConfig` of the Python package has the default of each and its origin.
 
+use serde::Deserialize;
+
 /// Settings of a [`Detector`](crate::Detector), `[vision]` in a configuration file.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize),
-    serde(deny_unknown_fields)
-)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Weights of blue, green, red in Fisher's discriminant, Eq. (12).
     pub weights: [f64; 3],
@@ -50,17 +48,13 @@ pub struct Settings {
     /// Intensity fit of blurred bands.
     pub blur: BlurSettings,
     /// Whether these are the thresholds for images of which the posture is not known.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[serde(skip)]
     pub is_unlocated: bool,
 }
 
 /// Settings of the outline fit, `[vision.fit]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize),
-    serde(deny_unknown_fields)
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FitSettings {
     /// Standard deviation of an edge point (px), neighbours taken as independent.
     pub edge_deviation: f64,
@@ -81,12 +75,8 @@ pub struct FitSettings {
 }
 
 /// Scores at which a result is clear and nothing else is tried, `[vision.clear]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize),
-    serde(deny_unknown_fields)
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ClearSettings {
     /// Least edge share of each band; below it, the largest Mahalanobis distance shrinks too.
     pub least_edges: f64,
@@ -97,12 +87,8 @@ pub struct ClearSettings {
 }
 
 /// Settings where the posture is not known, `[vision.unlocated]`.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize),
-    serde(deny_unknown_fields)
-)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct UnlocatedSettings {
     /// Weights and thresholds that are tried after [`Settings::alternatives`].
     pub alternatives: Vec<([f64; 3], f64)>,
@@ -115,12 +101,8 @@ pub struct UnlocatedSettings {
 }
 
 /// Settings of the intensity fit of blurred bands, `[vision.blur]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize),
-    serde(deny_unknown_fields)
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BlurSettings {
     /// Expected standard deviation of the blur kernel (px).
     pub sigma: f64,

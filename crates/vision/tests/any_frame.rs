@@ -117,6 +117,19 @@ proptest! {
 }
 
 #[test]
+fn invalid_discriminants_are_rejected_by_name() {
+    let rejected = |weights, threshold| {
+        let error = ColorDiscriminant::new(weights, threshold).unwrap_err();
+        error.field
+    };
+    assert_eq!(rejected([0.0; 3], 0.0), "weights");
+    assert_eq!(rejected([f64::NAN, 1.0, 1.0], 0.0), "weights");
+    assert_eq!(rejected([f64::INFINITY, 1.0, 1.0], 0.0), "weights");
+    assert_eq!(rejected([1e300, 1.0, 1.0], 0.0), "weights");
+    assert_eq!(rejected([1.0; 3], f64::NAN), "threshold");
+}
+
+#[test]
 fn invalid_settings_are_rejected_by_name() {
     assert!(Detector::new(SETTINGS).is_ok());
     let rejected = |settings| Detector::new(settings).unwrap_err().field;
@@ -133,5 +146,16 @@ fn invalid_settings_are_rejected_by_name() {
             ..SETTINGS
         }),
         "minimum_area"
+    );
+    let black = vec![([0.0; 3], 0.0)];
+    let mut settings = SETTINGS;
+    settings.unlocated.alternatives.clone_from(&black);
+    assert_eq!(rejected(settings), "unlocated.alternatives");
+    assert_eq!(
+        rejected(Settings {
+            alternatives: black,
+            ..SETTINGS
+        }),
+        "alternatives"
     );
 }

@@ -2,9 +2,22 @@
 
 mod support;
 
+use fearless_simd::Level;
 use proptest::prelude::*;
-use support::{Memory, memory, weights};
-use tautscope_vision::{ColorDiscriminant, Segmenter, Window};
+use support::{Memory, format, memory, weights};
+use tautscope_vision::{ColorDiscriminant, Image, PixelFormat, Segmenter, Window};
+
+/// Instruction sets to test: the best of this machine, the next that multiplies bytes in pairs, and the least.
+fn levels() -> impl Iterator<Item = Level> {
+    let best = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let narrower = best.as_avx2().map(fearless_simd::Simd::level);
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let narrower = None;
+    [Some(best), narrower, Some(Level::baseline())]
+        .into_iter()
+        .flatten()
+}
 
 /// The marker pixels by row of the window; checks that the row after one with some is visited.
 fn segmented(
@@ -64,7 +77,7 @@ fn threshold(memory: &Memory, weights: [f64; 3], pick: usize, shift: f64) -> f64
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn marker_pixels_are_those_of_the_definitions(
@@ -79,14 +92,60 @@ proptest! {
         let Ok(discriminant) = ColorDiscriminant::new(weights, threshold) else {
             return Ok(());
         };
-        let mut segmenter = Segmenter::new(discriminant, passes);
-        for memory in &memories {
-            let mask = memory.mask(weights, threshold, passes);
-            let whole = Window::whole(&memory.frame());
-            for window in [whole, window] {
-                let found = segmented(&mut segmenter, memory, window);
-                prop_assert_eq!(found, expected(&mask, window), "{:?}", window);
+        let masks = memories.iter().map(|memory| memory.mask(weights, threshold, passes));
+        let masks: Vec<_> = masks.collect();
+        for level in levels() {
+            let mut segmenter = Segmenter::new(discriminant, passes).with_level(level);
+            for (memory, mask) in memories.iter().zip(&masks) {
+                let whole = Window::whole(&memory.frame());
+                for window in [whole, window] {
+                    let found = segmented(&mut segmenter, memory, window);
+                    prop_assert_eq!(found, expected(mask, window), "{:?} {:?}", level, window);
+                }
             }
         }
+    }
+
+    #[test]
+    fn rows_far_from_a_marker_pixel_are_not_visited(
+        format in format(),
+        (half_width, half_height) in (128..300_usize, 30..100_usize),
+        (u, v) in any::<(prop::sample::Index, prop::sample::Index)>(),
+        passes in 0..9_usize,
+    ) {
+        let (width, height) = (2 * half_width, 2 * half_height);
+        let (u, v) = (u.index(width), v.index(height));
+        let (depth, stride) = (format.depth(), format.line_bytes(width));
+        // Grey, and one pixel that is brighter.
+        let mut data = vec![128; stride * format.lines(height)];
+        data[v * stride + depth * u..][..depth].fill(255);
+        let frame = Image::new(&data, format, [width, height], stride).unwrap();
+        let discriminant = ColorDiscriminant::new([1.0; 3], 700.0).unwrap();
+        for level in levels() {
+            let mut segmenter = Segmenter::new(discriminant, passes).with_level(level);
+            let mut visited = Vec::new();
+            segmenter.each_row(&frame, |row, _| visited.push(row));
+            prop_assert!(passes > 0 || visited.contains(&v), "{:?}: {}", level, v);
+            let is_near = |row: &usize| row.abs_diff(v) <= 3 * passes + 1;
+            prop_assert!(visited.iter().all(is_near), "{:?}: {} {:?}", level, v, visited);
+        }
+    }
+}
+
+#[test]
+fn a_pixel_whose_coarse_sum_is_the_coarse_level_is_found() {
+    // In fixed point the sum of this pixel is 150 in the coarse scan, and so is the level.
+    let (width, pixel) = (256, 70);
+    let mut data = vec![0; 3 * width];
+    data[3 * pixel + 1] = 2;
+    let frame = Image::new(&data, PixelFormat::Bgr, [width, 1], 3 * width).unwrap();
+    let discriminant = ColorDiscriminant::new([-0.5, 0.3, 0.2], 0.599).unwrap();
+    for level in levels() {
+        let mut found = Vec::new();
+        let mut segmenter = Segmenter::new(discriminant, 0).with_level(level);
+        segmenter.each_row(&frame, |_, runs| {
+            runs.each(|start, end| found.push((start, end)));
+        });
+        assert_eq!(found, [(pixel, pixel + 1)], "{level:?}");
     }
 }

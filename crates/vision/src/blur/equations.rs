@@ -57,6 +57,8 @@ pub fn normal_equations(
     let columns = patch.columns;
     let rows = patch.green.len() / columns.max(1);
     let step = patch.step;
+    let value =
+        |samples: &[f32], at: usize| f64::from(samples.get(at).copied().unwrap_or_default());
     let mut normal = [[0.0; UNKNOWNS]; UNKNOWNS];
     let mut right_side = [0.0; UNKNOWNS];
     for v in 1..rows.saturating_sub(1) {
@@ -67,12 +69,10 @@ pub fn normal_equations(
             row[SIGMA + 1..].copy_from_slice(&patch.tissue(at));
             for (band, mask) in masks.iter().enumerate() {
                 let [here, left, right, above, below] =
-                    [at, at - 1, at + 1, at - columns, at + columns].map(|index| {
-                        f64::from(mask.coverage.get(index).copied().unwrap_or_default())
-                    });
+                    [at, at - 1, at + 1, at - columns, at + columns]
+                        .map(|at| value(&mask.coverage, at));
                 for (entry, masks) in row.iter_mut().zip(moved) {
-                    let there =
-                        f64::from(masks[band].coverage.get(at).copied().unwrap_or_default());
+                    let there = value(&masks[band].coverage, at);
                     *entry += brightness[band] * (there - here) / DIFFERENCE;
                 }
                 row[4 + band] = here;
@@ -81,7 +81,7 @@ pub fn normal_equations(
                     brightness[band] * sigma * (left + right + above + below - 4.0 * here)
                         / (step * step);
             }
-            let green = f64::from(patch.green.get(at).copied().unwrap_or_default());
+            let green = value(&patch.green, at);
             let weight = noise.weight(patch.redness(at));
             for (index, own) in row.iter().enumerate() {
                 let weighted = weight * own;

@@ -1,9 +1,9 @@
 //! Result of the intensity fit.
 
-use crate::math::Square;
+use crate::math::{Square, points};
 use crate::recognition::{BandScore, Outline, Recognition};
 use crate::scan::RunMap;
-use crate::settings::{BlurSettings, Settings};
+use crate::settings::Settings;
 
 /// Positions of both bands by their intensity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,24 +50,18 @@ impl BlurFit {
         is_inside(a, b) && is_inside(b, a)
     }
 
-    /// Whether the blur exceeds that of a sharp image.
-    pub fn is_blurred(&self, settings: &BlurSettings) -> bool {
-        self.sigma > settings.sharp_sigma
-    }
-
     /// The result: the explained share takes the place of the edge share, and sigma that of the growth.
     pub fn recognition(&self) -> Recognition {
-        let [a, b] = &self.outlines;
-        let [ua, va, ub, vb] = self.features;
+        let centroids = points(self.features);
         Recognition {
             features: self.features,
             covariance: self.covariance,
-            scores: [(a, [ua, va]), (b, [ub, vb])].map(|(outline, centroid)| BandScore {
-                pixels: outline.area,
+            scores: [0, 1].map(|band| BandScore {
+                pixels: self.outlines[band].area,
                 edges: self.explained,
                 growth: self.sigma,
                 mahalanobis_squared: self.mahalanobis_squared,
-                centroid,
+                centroid: centroids[band],
                 ..BandScore::default()
             }),
             rejections: [None; 2],

@@ -7,8 +7,8 @@ use super::equations::{
 };
 use super::fit::BlurFit;
 use super::mask::Mask;
-use super::patch::{Patch, SIDE};
-use crate::math::{Square, apply, floor, inverse, quadratic};
+use super::patch::Patch;
+use crate::math::{Square, apply, difference, floor, inverse, quadratic};
 use crate::recognition::{BandPrediction, BandPredictor, Outline};
 use crate::scan::Frame;
 use crate::settings::Settings;
@@ -43,24 +43,13 @@ const BAND_MARGIN: f64 = 4.0;
 const LEAST_SIDE: usize = 8;
 
 /// Fits the intensity, in memory that it keeps.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct BlurFitter {
     patch: Patch,
     masks: [Mask; 2],
     /// The masks where each coordinate is larger by [`DIFFERENCE`].
     moved: [[Mask; 2]; 4],
-    buffer: Vec<f32>,
-}
-
-impl Default for BlurFitter {
-    fn default() -> Self {
-        Self {
-            patch: Patch::default(),
-            masks: std::array::from_fn(|_| Mask::default()),
-            moved: std::array::from_fn(|_| std::array::from_fn(|_| Mask::default())),
-            buffer: Vec::with_capacity(SIDE * SIDE),
-        }
-    }
+    buffer: Mask,
 }
 
 impl BlurFitter {
@@ -114,7 +103,7 @@ impl BlurFitter {
                 sigma,
                 &noise,
             );
-            let offset: [f64; 4] = std::array::from_fn(|i| prediction.features[i] - position[i]);
+            let offset = difference(prediction.features, position);
             for (row, pull) in apply(&prior, offset).into_iter().enumerate() {
                 right[row] += pull;
                 for (entry, prior) in normal[row].iter_mut().zip(prior[row]) {
@@ -153,7 +142,7 @@ impl BlurFitter {
                 sensor_variance,
             );
             tissue_unevenness = left.tissue_unevenness.max(settings.unevenness);
-            let offset: [f64; 4] = std::array::from_fn(|i| prediction.features[i] - position[i]);
+            let offset = difference(prediction.features, position);
             let model_variance = settings.model_deviation * settings.model_deviation;
             result = Some(BlurFit {
                 features: position,
@@ -245,9 +234,8 @@ fn drawn(
     std: f64,
 ) -> Option<(BandPrediction, [Outline; 2])> {
     let prediction = predictor.predict(position, [std; 4])?;
-    let [a, b] = &prediction.outlines;
-    let [ua, va, ub, vb] = position;
-    Some((prediction, [a.moved_to([ua, va]), b.moved_to([ub, vb])]))
+    let outlines = prediction.outlines_at(position);
+    Some((prediction, outlines))
 }
 
 /// The covariance of the predicted positions, with the model's errors of both bands correlated.

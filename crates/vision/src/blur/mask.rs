@@ -78,7 +78,7 @@ impl Mask {
     }
 
     /// Convolves the mask with a normal density of standard deviation `sigma` (samples), cut at 3 sigma.
-    pub fn blur(&mut self, sigma: f64, columns: usize, buffer: &mut Vec<f32>) {
+    pub fn blur(&mut self, sigma: f64, columns: usize, Self { coverage: buffer }: &mut Self) {
         let mut kernel = [0.0_f32; SIDE / 2];
         let reach = floor((3.0 * sigma).ceil()).clamp(1, kernel.len() - 1);
         let mut sum = 0.0;
@@ -92,62 +92,26 @@ impl Mask {
         }
         buffer.clear();
         buffer.resize(self.coverage.len(), 0.0);
-        for (row, blurred) in self
-            .coverage
-            .chunks(columns.max(1))
-            .zip(buffer.chunks_mut(columns.max(1)))
-        {
+        let columns = columns.max(1);
+        let reached =
+            |at: usize, count: usize| at.saturating_sub(reach)..(at + reach + 1).min(count);
+        let rows = self.coverage.chunks(columns);
+        for (row, blurred) in rows.zip(buffer.chunks_mut(columns)) {
             for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
-                for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
-                    if let Some(target) = blurred.get_mut(u + index) {
-                        *target += weight * value;
-                    }
-                    if index > 0
-                        && let Some(target) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
-                    {
-                        *target += weight * value;
-                    }
+                for to in reached(u, row.len()) {
+                    blurred[to] += kernel[u.abs_diff(to)] * value;
                 }
             }
         }
         self.coverage.fill(0.0);
-        let rows = buffer.len() / columns.max(1);
-        for (v, row) in buffer.chunks(columns.max(1)).enumerate() {
-            for to in v.saturating_sub(reach)..(v + reach + 1).min(rows) {
+        let rows = buffer.len() / columns;
+        for (v, row) in buffer.chunks(columns).enumerate() {
+            for to in reached(v, rows) {
                 let weight = kernel[v.abs_diff(to)];
                 let into = self.coverage.iter_mut().skip(to * columns);
                 for (target, value) in into.zip(row) {
                     *target += weight * value;
                 }
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_section_hides_what_is_within_its_radius_of_the_band_that_is_farther() {
-        let columns = 12;
-        let mut patch = Patch::default();
-        (patch.origin, patch.step, patch.columns) = ([100.5, 50.5], 2.0, columns);
-        let disc = SectionDisc {
-            centre: [109.0, 60.0],
-            radius: 5.0,
-            is_nearer: [true, false],
-        };
-        let mut section = [None; SECTION_DISCS];
-        section[2] = Some(disc);
-        let mut mask = Mask::default();
-        for band in [0, 1] {
-            mask.coverage = vec![1.0; columns * columns];
-            mask.hide(&section, band, &patch);
-            for (index, value) in mask.coverage.iter().enumerate() {
-                let [u, v] = patch.coordinates(index);
-                let is_hidden = band == 0 && (u - 109.0).hypot(v - 60.0) < 5.0;
-                assert_eq!(*value < 0.5, is_hidden, "{band} {u} {v}");
             }
         }
     }

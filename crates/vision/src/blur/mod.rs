@@ -5,8 +5,6 @@ mod fit;
 mod fitter;
 mod mask;
 mod patch;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use fit::BlurFit;
 pub(crate) use fitter::BlurFitter;

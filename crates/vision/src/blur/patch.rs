@@ -62,17 +62,16 @@ impl Patch {
         let count = self.columns * (rows.len() / step);
         self.differences.clear();
         self.differences.resize(count, [0.0; 2]);
-        let format = frame.format();
         let share = 1.0 / (self.step * self.step);
-        let channels = DIFFERENCES.map(|weights| Affine::new(weights.map(|w| share * w), format));
-        let groups = format.whole_groups(columns.clone());
+        let channels =
+            DIFFERENCES.map(|weights| Affine::new(weights.map(|w| share * w), frame.format()));
         let means = self.differences.chunks_mut(self.columns.max(1));
         for (row, into) in means.enumerate() {
             for v in (0..step).map(|offset| rows.start + row * step + offset) {
-                let pixels = Row::of(frame, v, groups.clone());
+                let pixels = Row::of(frame, v);
                 for (u, sums) in (columns.clone()).step_by(step).zip(&mut *into) {
                     for u in u..u + step {
-                        let pixel = pixels.pixel(u - groups.start);
+                        let pixel = pixels.pixel(u);
                         for (sum, channel) in sums.iter_mut().zip(&channels) {
                             *sum += single(channel.of(pixel));
                         }
@@ -185,19 +184,15 @@ mod tests {
         let data = row.collect::<Vec<u8>>().repeat(height);
         let frame = Image::new(&data, PixelFormat::Bgr, [width, height], 3 * width).unwrap();
         // Only the tissue on the left is outside the outline.
-        let corner = |index: usize| {
-            let share = real(index % (CORNERS / 2)) / real(CORNERS / 2 - 1);
-            let along = 15.5
-                + 70.0
-                    * if index < CORNERS / 2 {
-                        share
-                    } else {
-                        1.0 - share
-                    };
-            [along, if index < CORNERS / 2 { -1.0 } else { 17.0 }]
-        };
+        let corners = std::array::from_fn(|index| match index / (CORNERS / 2) {
+            0 => [15.5 + 70.0 * real(index) / real(CORNERS / 2 - 1), -1.0],
+            _ => [
+                15.5 + 70.0 * real(CORNERS - 1 - index) / real(CORNERS / 2 - 1),
+                17.0,
+            ],
+        });
         let outline = Outline {
-            corners: std::array::from_fn(corner),
+            corners,
             centroid: [50.5, 8.0],
             area: 70.0 * 18.0,
         };

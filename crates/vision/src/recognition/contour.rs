@@ -119,11 +119,8 @@ fn crossing(map: &RunMap, at: [f64; 2], [nu, nv]: [f64; 2], reach: f64) -> Optio
         if marker(along) != inside {
             let middle = along - step / 2.0;
             let is_beyond = marker(middle) != inside;
-            return Some(if is_beyond {
-                middle - step / 4.0
-            } else {
-                middle + step / 4.0
-            });
+            let half = if is_beyond { -0.25 } else { 0.25 };
+            return Some(middle + half * step);
         }
         along += step;
     }

@@ -2,7 +2,7 @@
 
 use super::contour::{Contour, Edge, find_edge};
 use super::prediction::BandPrediction;
-use crate::math::{Square, apply, inverse};
+use crate::math::{Square, apply, difference, inverse};
 use crate::scan::RunMap;
 use crate::settings::FitSettings;
 
@@ -146,8 +146,4 @@ pub fn fit(
         });
     }
     result
-}
-
-fn difference([a0, a1, a2, a3]: [f64; 4], [b0, b1, b2, b3]: [f64; 4]) -> [f64; 4] {
-    [a0 - b0, a1 - b1, a2 - b2, a3 - b3]
 }

@@ -128,13 +128,13 @@ impl Recognition {
         }
     }
 
-    /// Quality of a candidate, to compare it with others of the same frame; nothing is accepted or rejected by it.
+    /// Quality of a candidate, by which [`is_better`](Self::is_better) compares it; nothing is accepted or rejected by it.
     ///
     /// An accepted band counts 1 plus its edge share, less 0.02 per unit of squared Mahalanobis distance, which is 0.37 at
     /// the default threshold. A rejected band counts a tenth of its edge share: two of them count less than an accepted
     /// one. A band that is outside the image but clear otherwise counts as accepted; else an outline that fits worse, but
     /// lies farther inside, would be preferred.
-    pub(crate) fn quality(&self, settings: &Settings) -> f64 {
+    fn quality(&self, settings: &Settings) -> f64 {
         let bands = self.scores.iter().zip(&self.rejections);
         let quality = |(score, rejection): (&BandScore, &Option<Rejection>)| {
             if is_located(score, *rejection, settings) {

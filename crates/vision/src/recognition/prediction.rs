@@ -1,7 +1,7 @@
 //! Predicted position and outline of both bands.
 
 use super::outline::Outline;
-use crate::math::{floor, real};
+use crate::math::{floor, points, real};
 use crate::scan::{Frame, Window};
 
 /// Prediction of both bands in a frame.
@@ -16,9 +16,15 @@ pub struct BandPrediction {
 }
 
 impl BandPrediction {
+    /// The outlines with their centroids at `features` (px).
+    pub(crate) fn outlines_at(&self, features: [f64; 4]) -> [Outline; 2] {
+        let [a, b] = points(features);
+        [self.outlines[0].moved_to(a), self.outlines[1].moved_to(b)]
+    }
+
     /// The part of a frame that contains both bands within 3 standard deviations and a margin (px).
     ///
-    /// None if it is more than a quarter of the frame: reading the whole frame then takes little longer.
+    /// None if it is more than a quarter of the frame, because reading the whole frame then takes little longer, or outside.
     pub(crate) fn window(&self, frame: &impl Frame, margin: f64) -> Option<Window> {
         let [size_u, size_v] = [frame.width(), frame.height()].map(real);
         let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];

@@ -1,12 +1,16 @@
 //! Scores of a fitted outline, and the thresholds they must reach.
 
-use super::fit::Fit;
+use super::fit::{Fit, Growth};
 use super::prediction::BandPrediction;
 use super::rejection::Rejection;
+use crate::math::points;
 use crate::scan::RunMap;
 use crate::settings::Settings;
 
 /// Scores of a band.
+///
+/// Of a band without edges, which is recognised by its intensity: `edges` is the share of the intensity's variance that is explained,
+/// `growth` the standard deviation of the blur (px), `pixels` the area of the outline (px), and all other shares are 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BandScore {
     /// Share of the outline's area inside the image.
@@ -66,12 +70,11 @@ pub fn score(
     map: &RunMap,
     settings: &Settings,
 ) -> ([BandScore; 2], [Option<Rejection>; 2]) {
-    let [ua, va, ub, vb] = fit.features;
-    let centroids = [[ua, va], [ub, vb]];
+    let centroids = points(fit.features);
+    let moved = prediction.outlines_at(fit.features);
     let outlines = [0, 1].map(|band| {
-        prediction.outlines[band]
-            .moved_to(centroids[band])
-            .grown(f64::midpoint(fit.growth[band].rims, fit.growth[band].sides))
+        let Growth { rims, sides } = fit.growth[band];
+        moved[band].grown(f64::midpoint(rims, sides))
     });
     let scores = [0, 1].map(|band| {
         let (own, other) = (&outlines[band], &outlines[1 - band]);

@@ -171,11 +171,9 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         let prediction = last?;
         let mut result = Recognition::of(&prediction, &found, self.map, self.settings);
         if self.settings.is_unlocated {
-            let [ua, va, ub, vb] = found.features;
-            let [a, b] = &prediction.outlines;
             result.require_instrument(
                 self.frame,
-                &[a.moved_to([ua, va]), b.moved_to([ub, vb])],
+                &prediction.outlines_at(found.features),
                 &self.predictor.section(found.features, [0.5; 4]),
                 self.settings,
             );

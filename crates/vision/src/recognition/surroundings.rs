@@ -26,8 +26,9 @@ const BESIDE: [f64; 3] = [4.0, 6.0, 8.0];
 /// Samples that are as green as a band are left out: letters of the bands' colour have more letters between them.
 pub fn contrast_between(frame: &impl Frame, [a, b]: &[Outline; 2]) -> Option<f64> {
     let mut redness = Redness::of(frame);
+    let facing = |index: usize| [a.corners[OUTLINE_CORNERS - 1 - index], b.corners[index]];
     for index in 2..RIM - 2 {
-        let [near, far] = [a.corners[OUTLINE_CORNERS - 1 - index], b.corners[index]];
+        let [near, far] = facing(index);
         let own = a.corners[index];
         let between = BETWEEN.map(|share| along(near, far, share));
         let beyond = BEYOND.map(|share| along(own, far, share));
@@ -38,11 +39,8 @@ pub fn contrast_between(frame: &impl Frame, [a, b]: &[Outline; 2]) -> Option<f64
     }
     for share in ALONG {
         let [one, other] = [0, RIM - 1].map(|index| {
-            along(
-                a.corners[OUTLINE_CORNERS - 1 - index],
-                b.corners[index],
-                share,
-            )
+            let [near, far] = facing(index);
+            along(near, far, share)
         });
         let [du, dv] = [one[0] - other[0], one[1] - other[1]];
         let width = du.hypot(dv).max(1e-6);

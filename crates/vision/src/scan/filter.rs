@@ -13,6 +13,8 @@ use super::runs::runs_of_bits;
 /// Projects and filters the active blocks of rows, and keeps the marker pixels of a strip.
 #[derive(Clone, Debug)]
 pub struct Filter {
+    width: usize,
+    height: usize,
     blocks: usize,
     passes: Vec<LowPass>,
     /// Input and output of a pass.
@@ -21,23 +23,12 @@ pub struct Filter {
     marker: Vec<u64>,
 }
 
-/// A step of the pass over the frame.
-#[derive(Clone, Copy)]
-pub struct Step<'a> {
-    /// The row that is read, unless all of them have been.
-    pub source: Option<Row<'a>>,
-    /// Number of the step.
-    pub index: usize,
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows that are read.
-    pub height: usize,
-}
-
 impl Filter {
     /// With this many passes of the low-pass.
     pub fn new(passes: usize) -> Self {
         Self {
+            width: 0,
+            height: 0,
             blocks: 0,
             passes: vec![LowPass::default(); passes],
             values: [const { Vec::new() }; 2],
@@ -50,8 +41,9 @@ impl Filter {
         self.passes.len()
     }
 
-    /// Makes room for rows of this width.
-    pub fn start(&mut self, width: usize) {
+    /// Starts an image; allocates only when the width grows.
+    pub fn start(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width, height);
         self.blocks = width.div_ceil(BLOCK);
         for values in &mut self.values {
             values.resize(self.blocks, [0; BLOCK]);
@@ -63,15 +55,18 @@ impl Filter {
     }
 
     /// Projects the active blocks of a row, filters them, with pass k being k rows behind, and applies the threshold.
+    ///
+    /// The steps are numbered from that of the first row; `first` is that of the strip. `source` is the row, None after the last.
     #[inline(always)]
     pub fn step<S: Simd>(
         &mut self,
         simd: S,
         active: &ActiveBlocks,
-        row: usize,
-        at: Step<'_>,
+        (first, step): (usize, usize),
+        source: Option<Row<'_>>,
         projection: &Projection,
     ) {
+        let row = step - first;
         for blocks in runs_of_bits(active.newly_active(row)) {
             for pass in &mut self.passes {
                 pass.reset(&blocks);
@@ -79,7 +74,7 @@ impl Filter {
         }
         let mut is_active = false;
         for blocks in runs_of_bits(active.active(row).iter().copied()) {
-            self.filter_blocks(simd, row, &blocks, at, projection);
+            self.filter_blocks(simd, (row, step), &blocks, source, projection);
             is_active = true;
         }
         if is_active {
@@ -93,17 +88,12 @@ impl Filter {
     fn filter_blocks<S: Simd>(
         &mut self,
         simd: S,
-        row: usize,
+        (row, step): (usize, usize),
         blocks: &Range<usize>,
-        Step {
-            source,
-            index,
-            width,
-            height,
-        }: Step<'_>,
+        source: Option<Row<'_>>,
         projection: &Projection,
     ) {
-        let columns = blocks.start * BLOCK..width.min(blocks.end * BLOCK);
+        let columns = blocks.start * BLOCK..self.width.min(blocks.end * BLOCK);
         let [values, filtered] = self.values.each_mut();
         let (Some(mut values), Some(mut filtered)) = (
             values.get_mut(blocks.clone()),
@@ -116,9 +106,9 @@ impl Filter {
         {
             projection.project(simd, source.columns(columns.clone()), values);
         }
-        for (n, pass) in (0..=index).rev().zip(&mut self.passes) {
+        for (n, pass) in (0..=step).rev().zip(&mut self.passes) {
             replicate_end(values, columns.len());
-            pass.step(simd, values, filtered, blocks, (n, height));
+            pass.step(simd, values, filtered, blocks, (n, self.height));
             (values, filtered) = (filtered, values);
         }
         let words = row * self.blocks + blocks.start..row * self.blocks + blocks.end;

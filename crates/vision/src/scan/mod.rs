@@ -30,22 +30,7 @@ pub use frame::{Frame, Image, Window};
 pub use regions::{Labeller, Region};
 pub(crate) use row::Row;
 pub(crate) use run_map::RunMap;
-pub use runs::{Runs, each_run};
+pub use runs::Runs;
 pub use scanner::MAX_REGIONS;
 pub(crate) use scanner::{Regions, Scanner};
 pub use segment::Segmenter;
-
-/// Instruction sets to test: the best of this machine, the next that multiplies bytes in pairs, and the least.
-#[cfg(test)]
-fn levels() -> Vec<fearless_simd::Level> {
-    use fearless_simd::Level;
-    let best = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    let narrower = best.as_avx2().map(fearless_simd::Simd::level);
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    let narrower = None;
-    [Some(best), narrower, Some(Level::baseline())]
-        .into_iter()
-        .flatten()
-        .collect()
-}

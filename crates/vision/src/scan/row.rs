@@ -42,26 +42,24 @@ pub trait Consumer {
 }
 
 impl<'a> Row<'a> {
-    /// Columns of row `v` of a frame, in whole groups ([`PixelFormat::whole_groups`]).
+    /// Row `v` of a frame.
     #[inline(always)]
-    pub fn of(frame: &'a impl Frame, v: usize, columns: Range<usize>) -> Self {
-        let (format, width, height) = (frame.format(), frame.width(), frame.height());
-        let line = |index, bytes: Range<usize>| frame.line(index).get(bytes).unwrap_or_default();
-        let depth = format.depth();
-        let bytes = depth * columns.start..depth * columns.end;
+    pub fn of(frame: &'a impl Frame, v: usize) -> Self {
+        let (width, height) = (frame.width(), frame.height());
         // Rows of U, then of V, of a planar frame, two to a line.
         let half = |row: usize| {
             let offset = row % 2 * (width / 2);
-            let bytes = offset + columns.start / 2..offset + columns.end / 2;
-            line(height + row / 2, bytes)
+            let bytes = frame.line(height + row / 2).get(offset..offset + width / 2);
+            bytes.unwrap_or_default()
         };
-        match format {
-            PixelFormat::Bgr | PixelFormat::Rgb => Self::Triples(line(v, bytes)),
-            PixelFormat::Bgra => Self::Quadruples(line(v, bytes)),
-            PixelFormat::Yuyv => Self::Yuyv(line(v, bytes)),
-            PixelFormat::Uyvy => Self::Uyvy(line(v, bytes)),
-            PixelFormat::Nv12 => Self::Nv12(line(v, bytes.clone()), line(height + v / 2, bytes)),
-            PixelFormat::I420 => Self::I420(line(v, bytes), half(v / 2), half(height / 2 + v / 2)),
+        let line = |index| frame.line(index);
+        match frame.format() {
+            PixelFormat::Bgr | PixelFormat::Rgb => Self::Triples(line(v)),
+            PixelFormat::Bgra => Self::Quadruples(line(v)),
+            PixelFormat::Yuyv => Self::Yuyv(line(v)),
+            PixelFormat::Uyvy => Self::Uyvy(line(v)),
+            PixelFormat::Nv12 => Self::Nv12(line(v), line(height + v / 2)),
+            PixelFormat::I420 => Self::I420(line(v), half(v / 2), half(height / 2 + v / 2)),
         }
     }
 
@@ -69,12 +67,12 @@ impl<'a> Row<'a> {
     #[inline(always)]
     pub fn columns(self, columns: Range<usize>) -> Self {
         let cut = |bytes: &'a [u8], depth: usize| {
-            let bytes_wanted = depth * columns.start..depth * columns.end;
-            bytes.get(bytes_wanted).unwrap_or_default()
+            let wanted = depth * columns.start..depth * columns.end;
+            bytes.get(wanted).unwrap_or_default()
         };
         let half = |bytes: &'a [u8]| {
-            let bytes_wanted = columns.start / 2..columns.end / 2;
-            bytes.get(bytes_wanted).unwrap_or_default()
+            let wanted = columns.start / 2..columns.end / 2;
+            bytes.get(wanted).unwrap_or_default()
         };
         match self {
             Self::Triples(bytes) => Self::Triples(cut(bytes, 3)),

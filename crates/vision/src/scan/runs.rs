@@ -36,17 +36,6 @@ impl Runs<'_> {
     }
 }
 
-/// Calls `found(start, end)` for each maximal run of items that are `inside`.
-pub fn each_run<T>(row: &[T], inside: impl Fn(&T) -> bool, mut found: impl FnMut(usize, usize)) {
-    let words = row.chunks(BLOCK).map(|block| {
-        let bits = block.iter().zip(0..);
-        bits.fold(0, |word, (item, u)| word | u64::from(inside(item)) << u)
-    });
-    for run in runs_of_bits(words) {
-        found(run.start, run.end);
-    }
-}
-
 /// The maximal runs of bits that are set, counted from the lowest bit of the first word.
 #[inline(always)]
 pub(crate) fn runs_of_bits<W: IntoIterator<Item = u64>>(words: W) -> BitRuns<W::IntoIter> {

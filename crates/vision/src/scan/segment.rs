@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch, prelude::*};
 
 use super::active_blocks::{ActiveBlocks, BLOCK, STRIP};
 use super::discriminant::ColorDiscriminant;
-use super::filter::{Filter, Step};
+use super::filter::Filter;
 use super::format::PixelFormat;
 use super::frame::{Frame, Window};
 use super::projection::{Projection, least_scan_width};
@@ -42,6 +42,12 @@ impl Segmenter {
             active: ActiveBlocks::default(),
             filter: Filter::new(smoothing),
         }
+    }
+
+    /// With the instructions of a level in place of the best ones of this processor.
+    #[must_use]
+    pub fn with_level(self, level: Level) -> Self {
+        Self { level, ..self }
     }
 
     /// Calls `visit(v, runs)`, top to bottom, for every row that has marker pixels and the row after it, and for some
@@ -91,12 +97,12 @@ fn sweep<S: Simd>(
     let columns = frame.format().whole_groups(read.left..read.right);
     let columns = whole_blocks(columns, frame.width());
     let (width, height) = (columns.len(), read.bottom - read.top);
-    let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
+    let line = |n: usize| Row::of(frame, read.top + n).columns(columns.clone());
     // A pixel in row n changes the filtered rows n - delay to n + delay, which depend on rows n - 2 delay to
     // n + 2 delay: the scan is that far ahead.
     let reach = 2 * delay;
     active.start(width, reach);
-    filter.start(width);
+    filter.start(width, height);
     // In a narrower window the scan costs more than it saves.
     let is_scanned = width >= least_scan_width(simd, frame.format());
     let mut scanned = 0;
@@ -120,13 +126,7 @@ fn sweep<S: Simd>(
         }
         for step in steps.clone() {
             let source = (step < height).then(|| line(step));
-            let at = Step {
-                source,
-                index: step,
-                width,
-                height,
-            };
-            filter.step(simd, active, step - first, at, projection);
+            filter.step(simd, active, (first, step), source, projection);
         }
         for step in steps {
             let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {

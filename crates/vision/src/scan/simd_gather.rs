@@ -76,32 +76,3 @@ const fn permutations(shift: usize) -> [[u8; 64]; 2] {
     }
     indices
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::levels;
-    use super::*;
-    use fearless_simd::dispatch;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn projection_equals_that_pixel_by_pixel(
-            bytes in prop::collection::vec(any::<u8>(), 0..3 * 3 * BLOCK),
-            weights in prop::array::uniform3(-21_000..=21_000_i16),
-            offset in -500_000..500_000,
-        ) {
-            for simd in levels() {
-                let (pixels, _) = bytes.as_chunks::<3>();
-                let mut projected = vec![0; pixels.len()];
-                let done = dispatch!(simd, simd => project(simd, &bytes, weights, (offset, 9), &mut projected));
-                prop_assert!(done == 0 || done == pixels.len() / BLOCK * BLOCK);
-                for (pixel, value) in pixels.iter().zip(&projected[..done]) {
-                    let terms = pixel.iter().zip(weights);
-                    let sum: i32 = terms.map(|(x, weight)| i32::from(*x) * i32::from(weight)).sum();
-                    prop_assert_eq!(i32::from(*value), (sum + offset) >> 9);
-                }
-            }
-        }
-    }
-}
