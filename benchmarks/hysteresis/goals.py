@@ -37,18 +37,18 @@ class Goal:
 
 
 GOALS = {
-    "operator: reduction of tracking error": Goal("share", (0.85, 0.78, 0.80), "min"),
+    "operator: reduction of tracking error": Goal("share", (0.91, 0.81, 0.81), "min"),
     "operator: tracking error": Goal("tip"),
-    "operator: largest error": Goal("tip", (2.0, 0.5, 0.25)),
+    "operator: largest error": Goal("tip", (1.8, 0.38, 0.24)),
     "operator: tip overspeed": Goal("ratio", 2.0),
     "operator: creep": Goal("tip", (0.5, 0.05, 0.01)),
     "operator: bound of the reduction": Goal("share", None, "min"),
-    "disturbed operator: reduction of tracking error": Goal("share", (0.70, 0.60, 0.70), "min"),
+    "disturbed operator: reduction of tracking error": Goal("share", (0.78, 0.74, 0.85), "min"),
     "disturbed operator: tracking error": Goal("tip"),
     "disturbed operator: largest error": Goal("tip"),
     "disturbed operator: tip overspeed": Goal("ratio"),
-    "reduction of mean width": Goal("share", 0.95, "min"),
-    "reduction of max width": Goal("share", 0.90, "min"),
+    "reduction of mean width": Goal("share", (0.98, 0.96, 0.95), "min"),
+    "reduction of max width": Goal("share", (0.92, 0.88, 0.87), "min"),
     "actuator gain": Goal("ratio", LawConfig().free_gain),
     "tip overspeed": Goal("ratio", 2.0),
     "tip overspeed over paper's": Goal("ratio", 1.0, paired="tip overspeed"),

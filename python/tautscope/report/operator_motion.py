@@ -46,12 +46,12 @@ class OperatorResult:
         "Share of the tracking error that compensation removes.",
         "share",
         "min",
-        (0.85, 0.78, 0.80),
+        (0.91, 0.81, 0.81),
     )
     largest: float = figure(
         "largest error",
         "Largest distance of the tip from the reference with compensation.",
-        goal=(2e-3, 0.5, 0.25),
+        goal=(1.8e-3, 0.38, 0.24),
     )
     overspeed: float = figure(
         "tip overspeed",
