@@ -127,7 +127,6 @@ def _check_own(
 
 def _doctor(options: argparse.Namespace) -> int:
     if options.rig is None:
-        arguments.refuse_unused(options, "--rig: without it nothing moves", "yes")
         config = arguments.article_config(options.config)
         checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
     else:
