@@ -49,6 +49,30 @@ impl<const N: usize> Friction<N> {
         self.group.map(|own| own == group)
     }
 
+    /// For each DOF what `combine` makes of the values (N,) of the DOFs of its group, from `start`.
+    #[inline]
+    pub fn over_group(
+        &self,
+        values: [f64; N],
+        start: f64,
+        combine: impl Fn(f64, f64) -> f64,
+    ) -> [f64; N] {
+        let mut whole = [start; N];
+        for (value, group) in values.into_iter().zip(self.group) {
+            if let Some(whole) = whole.get_mut(group) {
+                *whole = combine(*whole, value);
+            }
+        }
+        self.group
+            .map(|group| whole.get(group).copied().unwrap_or(start))
+    }
+
+    /// For each DOF the sum of the values (N,) of the DOFs of its group.
+    #[inline]
+    pub fn sum(&self, values: [f64; N]) -> [f64; N] {
+        self.over_group(values, 0.0, |sum, value| sum + value)
+    }
+
     /// Group of each DOF.
     pub const fn group(&self) -> [usize; N] {
         self.group

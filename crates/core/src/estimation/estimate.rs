@@ -133,7 +133,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
 
     /// Tip (N,) [m or rad] that the plays give.
     pub fn tip(&self, plays: &Plays<N>) -> [f64; N] {
-        let apart = plays.tip(&self.coefficients(), [true; N]);
+        let apart = plays.tip(&self.coefficients());
         let moved = zip_with(apart, self.transmission.unit(), |tip, unit| unit * tip);
         zip_with(self.origin, moved, |origin, tip| origin + tip)
     }

@@ -49,10 +49,7 @@ impl<const N: usize> Direction<N> {
 
     /// Length of the string of each DOF's group.
     fn lengths(&self) -> [f64; N] {
-        self.friction.group().map(|group| {
-            let own = self.string.iter().zip(self.friction.members(group));
-            let own = own.filter(|(_, own)| *own);
-            libm::sqrt(own.map(|(string, _)| string * string).sum())
-        })
+        let squares = self.string.map(|string| string * string);
+        self.friction.sum(squares).map(libm::sqrt)
     }
 }

@@ -66,7 +66,7 @@ pub struct VectorLaw<const N: usize> {
     step_limit: [f64; N],
     /// Most by which |dc| - |du| grows in a tick.
     growth: f64,
-    /// |dc| - |du| of each group in the last tick, 0 or above.
+    /// |dc| - |du| of each DOF's group in the last tick, 0 or above.
     surplus: [f64; N],
     limits: [PlayLimit; N],
     direction: Direction<N>,
@@ -181,39 +181,38 @@ impl<const N: usize> VectorLaw<N> {
         self.target = self.within_limits(target, relative);
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
+        let friction = self.transmission.friction();
+        let turn = friction.sum(zip_with(before, direction, |a, b| a * b));
+        self.surplus = zip_with(
+            self.surplus,
+            turn,
+            |surplus, turn| {
+                if turn < 0.0 { 0.0 } else { surplus }
+            },
+        );
+        let length = self.norm(moved);
+        let step = self.bounded_step(relative, moved, length);
+        let taken = zip_with(self.norm(step), length, |step, own| (step - own).max(0.0));
         let (mut command, gain) = (self.command, self.settings.free_gain);
-        let mut surplus = self.surplus;
-        for (group, surplus) in surplus.iter_mut().enumerate() {
-            let members = self.transmission.friction().members(group);
-            let own = only(members, moved);
-            if self.norm(own) < REST {
+        // Without gain there is no compensation.
+        let share = if gain > 1.0 { self.share } else { 0.0 };
+        let dofs = command.iter_mut().zip(&mut self.surplus);
+        let dofs = dofs.zip(taken).zip(length).zip(self.transmission.dofs());
+        let parts = reference.into_iter().zip(self.lead).zip(motion).zip(step);
+        for (((((command, surplus), taken), length), dof), parts) in dofs.zip(parts) {
+            if length < REST {
                 continue;
             }
-            let has_turned = dot([1.0; N], only(members, before), direction) < 0.0;
-            let most = self.growth + if has_turned { 0.0 } else { *surplus };
-            let step = self.bounded_step(members, most, relative, own);
-            *surplus = (self.norm(step) - self.norm(own)).max(0.0);
-            // Without gain there is no compensation.
-            let share = if gain > 1.0 { self.share } else { 0.0 };
-            let parts = step
-                .into_iter()
-                .zip(unit)
-                .zip(motion.into_iter().zip(members));
-            let own = command.iter_mut().zip(self.lead).zip(reference).zip(parts);
-            let is_alone = members.iter().filter(|own| **own).count() == 1;
-            for (((command, lead), reference), ((step, unit), (motion, own))) in own {
-                if own {
-                    let before = *command;
-                    *command = reference + lead + share * (step * unit - motion);
-                    if is_alone {
-                        // Eq. (2), to the last bit.
-                        let farthest = before + gain * motion;
-                        *command = command.max(before.min(farthest)).min(before.max(farthest));
-                    }
-                }
+            let (((reference, lead), motion), step) = parts;
+            let before = *command;
+            *surplus = taken;
+            *command = reference + lead + share * (step * dof.unit - motion);
+            if dof.is_alone {
+                // Eq. (2), to the last bit.
+                let farthest = before + gain * motion;
+                *command = command.max(before.min(farthest)).min(before.max(farthest));
             }
         }
-        self.surplus = surplus;
         command
     }
 
@@ -273,7 +272,7 @@ impl<const N: usize> VectorLaw<N> {
         let dofs = steady.iter_mut().zip(dofs).zip(given);
         for ((to, ((dof, row), slack)), (reference, direction)) in dofs {
             let deflection = dof.deflection(row, direction);
-            let linear: f64 = row.iter().take(SHARED + OWN).sum();
+            let linear = product(&[1.0; SHARED + OWN], row);
             let constant = row.get(OFFSET).copied().unwrap_or(0.0);
             for _ in 0..SLIDES {
                 let tip = linear * *to - deflection + bent(row, *to, direction) + constant;
@@ -284,7 +283,7 @@ impl<const N: usize> VectorLaw<N> {
         let mut target = steady;
         for _ in 0..CORRECTIONS {
             let ahead = self.transmission.advance(&self.plays, &target);
-            let tip = ahead.tip(&self.rows, [true; N]);
+            let tip = ahead.tip(&self.rows);
             let dofs = target
                 .iter_mut()
                 .zip(steady)
@@ -315,53 +314,81 @@ impl<const N: usize> VectorLaw<N> {
         target
     }
 
-    /// Length of a motion (N,) in units, in `width_limit`.
-    fn norm(&self, motion: [f64; N]) -> f64 {
-        libm::sqrt(dot(self.weight, motion, motion))
+    /// For each DOF the product of two motions (N,) of its group, which are in units, in `width_limit`.
+    fn dot(&self, a: [f64; N], b: [f64; N]) -> [f64; N] {
+        let scaled = |values| zip_with(values, self.weight, |value, weight| weight * value);
+        let products = zip_with(scaled(a), scaled(b), |a, b| a * b);
+        self.transmission.friction().sum(products)
     }
 
-    /// The motion of the commands of a group towards the target, within the bounds, for a reference and the motion of the
-    /// group's own (N,), which is not 0, all in units.
-    fn bounded_step(
-        &self,
-        members: [bool; N],
-        surplus: f64,
-        reference: [f64; N],
-        motion: [f64; N],
-    ) -> [f64; N] {
-        let (dot, norm) = (|a, b| dot(self.weight, a, b), |a| self.norm(a));
-        let moved = norm(motion);
-        let mut step = only(members, subtract(self.target, self.plays.command));
-        // Never against the reference.
-        let against = dot(step, motion).min(0.0) / (moved * moved);
-        step = zip_with(step, motion, |step, motion| step - against * motion);
-        let length = norm(step);
-        if length == 0.0 {
-            return step;
+    /// For each DOF the length of a motion (N,) of its group, which is in units, in `width_limit`.
+    fn norm(&self, motion: [f64; N]) -> [f64; N] {
+        self.dot(motion, motion).map(libm::sqrt)
+    }
+
+    /// The motion of the commands towards the target, within the bounds of each group, for a reference and its motion (N,), all
+    /// in units; `moved` (N,) are the lengths of the motion. A group that rests does not move.
+    fn bounded_step(&self, reference: [f64; N], motion: [f64; N], moved: [f64; N]) -> [f64; N] {
+        let mut step = subtract(self.target, self.plays.command);
+        let against = self.dot(step, motion);
+        let dofs = step.iter_mut().zip(motion).zip(moved).zip(against);
+        for (((step, motion), moved), along) in dofs {
+            // Never against the reference.
+            let against = along.min(0.0) / (moved * moved);
+            *step = if moved < REST {
+                0.0
+            } else {
+                *step - against * motion
+            };
         }
-        let fastest = self.settings.free_gain * moved;
-        let mut share = (fastest.min(moved + surplus) / length).min(1.0);
-        let dofs = step.iter().zip(self.step_limit);
-        for ((step, limit), dof) in dofs.zip(self.transmission.dofs()) {
-            share = share.min(limit / (step.abs() * dof.unit));
+        let length = self.norm(step);
+        let mut share = self.step_limit;
+        for ((share, step), unit) in share.iter_mut().zip(step).zip(self.transmission.unit()) {
+            *share /= step.abs() * unit;
         }
-        let now = self.plays.tip(&self.rows, members);
-        let room = moved.max(dot(subtract(reference, now), motion) / moved);
+        share = self
+            .transmission
+            .friction()
+            .over_group(share, 1.0, f64::min);
+        let bounds = share.iter_mut().zip(self.surplus).zip(moved).zip(length);
+        for (((share, surplus), moved), length) in bounds {
+            let fastest = (self.settings.free_gain * moved).min(moved + (self.growth + surplus));
+            *share = share.min(fastest / length);
+        }
+        let now = self.plays.tip(&self.rows);
+        let gap = self.dot(subtract(reference, now), motion);
+        let room = zip_with(
+            moved,
+            zip_with(gap, moved, |gap, moved| gap / moved),
+            f64::max,
+        );
         for _ in 0..STEPS {
-            let mut there = self.plays;
-            let to = zip_with(there.command, step, |to, step| to + share * step);
-            self.transmission.move_group(&mut there, members, &to);
-            let change = subtract(there.tip(&self.rows, members), now);
-            let tip = norm(change);
-            let fastest = tip.max((EARLY * tip).min(share * length));
-            let excess = (fastest / (self.settings.tip_gain * moved))
-                .max(dot(change, motion) / (moved * room));
-            if excess <= 1.0 {
+            let part = zip_with(share, step, |share, step| share * step);
+            let to = zip_with(self.plays.command, part, |from, part| from + part);
+            let there = self.transmission.advance(&self.plays, &to);
+            let change = subtract(there.tip(&self.rows), now);
+            let (tip, along) = (self.norm(change), self.dot(change, motion));
+            let mut is_within = true;
+            let groups = share
+                .iter_mut()
+                .zip(length)
+                .zip(moved.into_iter().zip(room));
+            for (((share, length), (moved, room)), (tip, along)) in
+                groups.zip(tip.into_iter().zip(along))
+            {
+                let fastest = tip.max((EARLY * tip).min(*share * length));
+                let excess =
+                    (fastest / (self.settings.tip_gain * moved)).max(along / (moved * room));
+                if excess > 1.0 {
+                    *share *= (1.0 / excess).max(0.2);
+                    is_within = false;
+                }
+            }
+            if is_within {
                 break;
             }
-            share *= (1.0 / excess).max(0.2);
         }
-        step.map(|step| share * step)
+        zip_with(share, step, |share, step| share * step)
     }
 
     /// Counts the reference from elsewhere by `shift` (N,); the command stays.
@@ -379,15 +406,4 @@ fn subtract<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
 
 fn over<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
     zip_with(a, b, |a, b| a / b)
-}
-
-fn only<const N: usize>(members: [bool; N], vector: [f64; N]) -> [f64; N] {
-    zip_with(vector, members, |value, own| if own { value } else { 0.0 })
-}
-
-fn dot<const N: usize>(weight: [f64; N], a: [f64; N], b: [f64; N]) -> f64 {
-    let pairs = a.into_iter().zip(b).zip(weight);
-    pairs
-        .map(|((a, b), weight)| (weight * a) * (weight * b))
-        .sum()
 }

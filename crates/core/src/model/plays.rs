@@ -74,12 +74,11 @@ impl<const N: usize> Plays<N> {
         self.outputs.each_ref().map(Outputs::regressors)
     }
 
-    /// Regressors times coefficients of each of some DOFs, 0 for the others.
+    /// Regressors times coefficients of each DOF.
     #[inline]
-    pub fn tip(&self, rows: &[Row; N], members: [bool; N]) -> [f64; N] {
+    pub fn tip(&self, rows: &[Row; N]) -> [f64; N] {
         let mut tip = [0.0; N];
-        let dofs = tip.iter_mut().zip(&self.outputs).zip(rows).zip(members);
-        for (((tip, dof), row), _) in dofs.filter(|(_, member)| *member) {
+        for ((tip, dof), row) in tip.iter_mut().zip(&self.outputs).zip(rows) {
             *tip = product(&dof.regressors(), row);
         }
         tip
@@ -97,7 +96,8 @@ impl Outputs {
         let bent = curved.chunks_exact_mut(KNOTS.len());
         for (bent, play) in bent.zip(self.own.iter().step_by(2)) {
             for (entry, knot) in bent.iter_mut().zip(KNOTS) {
-                *entry = (play - knot).max(0.0);
+                let above = play - knot;
+                *entry = if above > 0.0 { above } else { 0.0 };
             }
         }
         row
@@ -189,31 +189,29 @@ impl<const N: usize> Transmission<N> {
     #[must_use]
     pub fn advance(&self, plays: &Plays<N>, to: &[f64; N]) -> Plays<N> {
         let mut next = *plays;
-        for group in 0..N {
-            self.move_group(&mut next, self.friction.members(group), to);
+        let dofs = next.outputs.iter_mut().zip(&self.dofs).zip(to);
+        let mut are_alone = true;
+        for ((outputs, dof), to) in dofs {
+            follow(&mut outputs.own, &OWN_RADII, *to);
+            if dof.is_alone {
+                follow(&mut outputs.shared, &dof.shared, *to);
+            }
+            are_alone &= dof.is_alone;
+        }
+        if !are_alone {
+            for group in 0..N {
+                let members = self.friction.members(group);
+                let mut own = self.dofs.iter().zip(members).filter(|(_, own)| *own);
+                if own.any(|(dof, _)| !dof.is_alone) {
+                    self.slide(members, to, &mut next.outputs);
+                }
+            }
         }
         for (command, to) in next.command.iter_mut().zip(to) {
             next.travel += (to - *command).abs();
             *command = *to;
         }
         next
-    }
-
-    /// Moves the plays of the DOFs of one friction group to a command (N,), in units.
-    pub fn move_group(&self, plays: &mut Plays<N>, members: [bool; N], to: &[f64; N]) {
-        let mut is_together = false;
-        let dofs = plays.outputs.iter_mut().zip(&self.dofs).zip(to);
-        for (((outputs, dof), to), _) in dofs.zip(members).filter(|(_, own)| *own) {
-            follow(&mut outputs.own, &OWN_RADII, *to);
-            if dof.is_alone {
-                follow(&mut outputs.shared, &dof.shared, *to);
-            } else {
-                is_together = true;
-            }
-        }
-        if is_together {
-            self.slide(members, to, &mut plays.outputs);
-        }
     }
 
     /// Vector plays of the DOFs of one group.
@@ -299,10 +297,8 @@ impl Radii {
     /// Sum of radius times coefficient while the tip slides steadily along `direction`, which is of length 1 in the motion of
     /// the surface of its group, or 0: command less tip over the gain, but for offset and bends.
     pub fn deflection(&self, row: &Row, direction: f64) -> f64 {
-        let shared: f64 = row.iter().zip(self.shared).map(|(w, h)| w * h).sum();
-        let own = row.iter().skip(SHARED).zip(OWN_RADII);
-        let own: f64 = own.map(|(w, r)| w * r).sum();
-        shared * direction + own * sign(direction)
+        let (shared, own) = row.split_at(SHARED);
+        product(shared, &self.shared) * direction + product(own, &OWN_RADII) * sign(direction)
     }
 }
 
@@ -322,19 +318,32 @@ fn map(a: &Lanes, b: &Lanes, combine: impl Fn(f64, f64) -> f64) -> Lanes {
 #[inline]
 fn follow<const K: usize>(outputs: &mut [f64; K], radii: &[f64; K], to: f64) {
     for (output, radius) in outputs.iter_mut().zip(radii) {
-        *output = output.max(to - radius).min(to + radius);
+        *output = between(*output, to - radius, to + radius);
     }
+}
+
+/// A value within limits; `f64::clamp` may panic, and `max` and `min` take care of NaN, which is slower.
+#[inline]
+fn between(value: f64, least: f64, most: f64) -> f64 {
+    let raised = if value < least { least } else { value };
+    if raised > most { most } else { raised }
 }
 
 /// Contribution of the bent plays of a DOF whose own plays slide along `direction` to a command `to`.
 pub fn bent(row: &Row, to: f64, direction: f64) -> f64 {
-    let radii = OWN_RADII
-        .iter()
-        .step_by(2)
-        .flat_map(|radius| KNOTS.map(|knot| radius * sign(direction) + knot));
-    let plays = row.iter().skip(SHARED + OWN).zip(radii);
-    let above = plays.filter(|(_, from)| to > *from);
-    above.fold(0.0, |sum, (w, from)| sum + w * (to - from))
+    let side = sign(direction);
+    let mut above = [0.0; BENT];
+    let plays = above
+        .chunks_exact_mut(KNOTS.len())
+        .zip(OWN_RADII.iter().step_by(2));
+    for (above, radius) in plays {
+        for (above, knot) in above.iter_mut().zip(KNOTS) {
+            let height = to - (radius * side + knot);
+            *above = if height > 0.0 { height } else { 0.0 };
+        }
+    }
+    let (_, weights) = row.split_at(SHARED + OWN);
+    product(weights, &above)
 }
 
 /// Row whose product with the coefficients is the gain of a DOF: all plays, and of the bent ones their mean slope from -1 to 1.
@@ -369,9 +378,11 @@ const fn row_of(play: f64, bent: [f64; KNOTS.len()], offset: f64) -> Row {
     row
 }
 
-/// Regressors times coefficients.
+/// Regressors times coefficients, as far as both go.
 #[inline]
-pub fn product(a: &Row, b: &Row) -> f64 {
+pub fn product(a: &[f64], b: &[f64]) -> f64 {
+    let count = a.len().min(b.len());
+    let (a, b) = (a.split_at(count).0, b.split_at(count).0);
     // Four sums at once: one alone waits for each addition.
     let mut sums = [0.0; 4];
     let (a, b) = (a.chunks_exact(4), b.chunks_exact(4));
