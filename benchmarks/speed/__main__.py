@@ -1,9 +1,9 @@
 """Computing time of control tick and image update of the loop, and of NumPy's pinv.
 
-One thread. The tick has three DOFs: supervision, law, command history. The image update is that
-after the vision: checks, state and offset estimates. The article's state estimation is h(q), its
-interaction matrix, the step and the rank check; NumPy only computes ``pinv(matrix) @ innovation``
-for a given matrix.
+One thread. The tick is supervision, law and command history, of three DOFs and of eight. The image
+update is that after the vision: checks, state and offset estimates. The article's state estimation
+is h(q), its interaction matrix, the step and the rank check; NumPy only computes
+``pinv(matrix) @ innovation`` for a given matrix.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 from common.rows import goal_row, print_rows
-from tautscope.config import Config, load_config
+from tautscope import axes
+from tautscope.config import Config, Sine, load_config
 from tautscope.loop import construction
 from tautscope.loop.references import OperatorMotion
 
@@ -38,8 +39,9 @@ def nanoseconds(work: Callable[[], object], per: int) -> list[float]:
 
 
 def control_tick(config: Config) -> list[float]:
-    ticks = 20_000
-    sines = [config.experiment.insertion, config.experiment.rotation, config.experiment.bending]
+    ticks, experiment = 20_000, config.experiment
+    three = [experiment.insertion, experiment.rotation, experiment.bending]
+    sines = [Sine(centre=0.0, amplitude=1.0)] * len(config.dof) or three
     phase = np.linspace(0.0, 40 * np.pi, ticks)
     references = np.stack([s.centre + s.amplitude * np.sin(phase) for s in sines], axis=1)
     times = np.arange(ticks) * config.control.period
@@ -109,9 +111,12 @@ def main() -> None:
         for what, times, goal in (
             ("control tick", tick, 1000.0),
             ("control tick without images", control_tick(each), 1000.0),
-            ("image update", update, 50_000.0),
+            ("image update", update, 30_000.0),
         ):
             loop_rows.append(goal_row(what, "ns", times, goal, profile=each.profile))
+    eight = control_tick(axes(8, width_limit=1.2))
+    what = "tick of 8 DOFs without images"
+    loop_rows.append(goal_row(what, "ns", eight, 2500.0, profile="best"))
     ratio = [theirs / own for theirs, own in zip(numpy_times, ours, strict=True)]
     rows = [
         *loop_rows,
