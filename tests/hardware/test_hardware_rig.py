@@ -31,6 +31,7 @@ from tautscope.errors import (
 )
 from tautscope.hardware.experiment import _apply_reaction, run_on_hardware
 from tautscope.hardware.rig import HardwareRig
+from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing, read_sent
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Rig
@@ -88,7 +89,7 @@ def test_a_second_ctrl_c_does_not_hide_a_stop_that_is_not_confirmed(
 
     monkeypatch.setattr(FakeMotors, "__exit__", stop_without_confirmation)
     one.rig.reset()
-    with pytest.raises(KeyboardInterrupt) as found:
+    with pytest.raises(KeyboardInterrupt) as found, exit_on_signals():
         try:
             raise KeyboardInterrupt
         finally:
