@@ -22,6 +22,7 @@ from instruments.properties import markdown_table
 from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
 from instruments.runs import VARIANTS, Figures, Run, simulate
 from tautscope.commands.printing import progress_bar
+from tautscope.report.operator_motion import EVALUATED_AFTER
 
 MOTIONS = ("hand", "sines")
 INSTRUMENTS = 200
@@ -51,7 +52,10 @@ def arguments() -> argparse.Namespace:
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.duration <= EVALUATED_AFTER:
+        parser.error(f"--duration {options.duration:g}: must be above {EVALUATED_AFTER:g} s")
+    return options
 
 
 def plan(options: argparse.Namespace) -> list[Run]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from dataclasses import asdict
 from typing import Any
@@ -219,6 +220,13 @@ def test_a_cluster_of_two_workers_gives_the_same_figures() -> None:
     for job in jobs:
         assert asdict(remote[job]) == asdict(simulate(job)), job
         assert remote[job].spread[0] > 0
+
+
+def test_a_motion_that_ends_before_it_counts_is_refused() -> None:
+    command = [sys.executable, str(ROOT / "benchmarks/instruments"), "--duration", "40"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "--duration 40: must be above 40 s" in done.stderr
 
 
 def test_a_missing_cluster_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,13 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 import tautscope
+from common.small_images import with_small_images
 from numpy.typing import ArrayLike
 from ros2.peers import peers
 from service_client import Client
 from tautscope.errors import StateError
 from tautscope.loop.measurement import Tip
 from tautscope.loop.rig import Sample
+from tautscope.ros2 import messages
+from tautscope.ros2.endpoints import IMAGE
+from tautscope.ros2.session import SENSOR_DATA
 from tautscope.ros2.wire import Qos
+from tautscope.twin import Twin
 
 
 class Arm:
@@ -156,3 +161,25 @@ def test_the_share_of_the_compensation_in_use_is_published(tmp_path: Path) -> No
             for _ in range(5):
                 both.tick()
             assert {each.data for each in both.drain(shares)} == {share}
+
+
+def test_an_image_that_cannot_be_sent_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The motion goes on: images are for people."""
+
+    def cannot(*_: object) -> None:
+        raise ValueError("no such encoding")
+
+    config = with_small_images(tautscope.load_config())
+    make: Any = lambda _: Twin(config)  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        monkeypatch.setattr(messages, "image", cannot)
+        images = both.other.subscription("/endoscope/image_raw", IMAGE, SENSOR_DATA)
+        both.delivered(resend=True)
+        both.request("enable")
+        for _ in range(40):
+            both.tick()
+        told = [each.data for each in both.drain(both.warnings)]
+        assert "an image was not sent: no such encoding" in told
+        assert images.take() is None

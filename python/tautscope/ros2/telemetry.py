@@ -103,6 +103,8 @@ class Telemetry:
             return
         self._camera_info.publish(fields.camera_info(captured, self._config.camera))
         if self._has_rig and self._sending.done() and self._image.has_subscribers:
+            if (error := self._sending.exception()) is not None:
+                self._warn_now_and_then("image", f"an image was not sent: {error}")
             self._sending = self._images.submit(self._send_image, captured, source)
 
     def _send_image(self, captured: int, frame: Frame) -> None:
@@ -127,10 +129,13 @@ class Telemetry:
     def refuse(self, error: MessageError) -> None:
         """Count a refused message, and warn at most once per second and field."""
         self.refused[error.field] += 1
+        self._warn_now_and_then(error.field, f"refused: {error}")
+
+    def _warn_now_and_then(self, what: str, text: str) -> None:
         now = self._clock.monotonic()
-        if now - self._warned.get(error.field, -DIAGNOSTICS_PERIOD) >= DIAGNOSTICS_PERIOD:
-            self._warned[error.field] = now
-            self.warn(f"refused: {error}")
+        if now - self._warned.get(what, -DIAGNOSTICS_PERIOD) >= DIAGNOSTICS_PERIOD:
+            self._warned[what] = now
+            self.warn(text)
 
     def result(self, text: str) -> None:
         """Publish what the compensation achieved."""

@@ -20,6 +20,7 @@ LARGEST = 1e100
 """Largest number: the sum of the squares of larger ones may overflow. Its inverse is 0."""
 _ALLOWED = f"a number up to {LARGEST:g}, or blank or NaN for none"
 _DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
+_ZONE = r"[+-]\d\d:?\d\d"
 _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 
 
@@ -80,10 +81,10 @@ def _times(text: pl.Series) -> pl.Series | None:
 
     plain = (
         text.str.replace(",", ".", literal=True)
-        .str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
+        .str.replace(f"(Z|{_ZONE})$", "")
         .str.replace("T", " ", literal=True)
     )
-    zone = text.str.extract(r"([+-]\d\d:?\d\d)$").str.replace(":", "", literal=True)
+    zone = text.str.extract(f"({_ZONE})$").str.replace(":", "", literal=True)
     hhmm = zone.cast(pl.Int64, strict=False).fill_null(0)
     minutes = hhmm.sign() * (hhmm.abs() // 100 * 60 + hhmm.abs() % 100)
     given = text.is_not_null() & (text != "")
