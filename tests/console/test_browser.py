@@ -578,6 +578,23 @@ def test_stop_is_always_on_top_nothing_is_cut_off_and_axe_finds_no_fault(
         pytest.skip(f"no {AXE}: `npm pack axe-core`, unpacked there, as .ci/run does")
 
 
+@pytest.mark.parametrize(("width", "height"), [(1024, 640), (1280, 720), (1440, 900)])
+def test_charts_can_be_read_below_a_warning(
+    width: int, height: int, open_page: Callable[..., Page]
+) -> None:
+    page = open_page()
+    page.set_viewport_size({"width": width, "height": height})
+    page.evaluate(
+        "text => { document.getElementById('warnings').hidden = false;"
+        " document.getElementById('latched').textContent = text }",
+        REMEDIES["slack_changed"],
+    )
+    seen = page.locator(".chart:visible")
+    boxes = [each.bounding_box() for each in seen.all()]
+    assert len(boxes) in (3, 9)
+    assert min(box["height"] for box in boxes if box) > 60
+
+
 def test_each_device_steers_after_every_control_was_used_and_a_touch_stops(
     console: RunningConsole, open_page
 ) -> None:

@@ -66,7 +66,7 @@ export class Charts {
     if (this.times.length > LENGTH) [this.times, ...this.rows.flatMap(Object.values)].forEach((list) => list.shift());
   }
 
-  /** A narrow window has room for one degree of freedom: the one that moves, or moved last. */
+  /** A small window has room for the charts of one degree of freedom: the one that moves, or moved last. */
   #show(index) {
     this.shown = index;
     this.cards.forEach((card, k) => card.classList.toggle("moved", k === index));
