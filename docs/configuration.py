@@ -11,7 +11,6 @@ from pathlib import Path
 
 import tomlkit
 from tautscope.config import Config
-from tautscope.config.checks import RANGED
 from tautscope.config.descriptions import Key, all_sections, keys, package_text, section_text
 from tautscope.config.fields import MOST_RATIO
 
@@ -25,10 +24,9 @@ A line whose comment has the word REPLACE is a placeholder: `tautscope run` refu
 `tautscope doctor` lists it.
 
 After the default come unit and limits; without limits, a number has to be above 0. "any" is any
-number, "3 x" three values of the kind, DOF the unit of the degree of freedom, m or rad. In
-{ranged}
-a number without an upper limit may be from a {factor:.0f}th to {factor:.0f} times its default:
-robots differ by less, and a wrong unit, which would switch a limit off, is more.
+number, "3 x" three values of the kind, DOF the unit of the degree of freedom, m or rad. A number
+with a default and without an upper limit may be from a {factor:.0f}th to {factor:.0f} times its
+default: robots differ by less, and a wrong unit, which would switch a limit off, is more.
 `[safety] unusual = ["safety.stall"]` allows any value for the keys that it names.
 """
 SHORT = {
@@ -61,7 +59,6 @@ def page() -> str:
         HEAD.format(
             package=package_text(),
             factor=MOST_RATIO,
-            ranged=", ".join(f"`[{name}]`" for name in RANGED),
         )
     ]
     described: set[object] = set()

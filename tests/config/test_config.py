@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from tautscope.config import (
     load_config,
     to_document,
 )
+from tautscope.config.load import config_file
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
 from tautscope.loop.safety import disabled_monitors
@@ -122,9 +124,9 @@ def test_a_bad_value_is_named(tmp_path: Path, text: str, field: str, value: obje
 
 
 def numbers(document: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of every number, and every list of numbers, but that of the twin."""
+    """Dotted path and value of every number, and every list of numbers."""
     for key, value in document.items():
-        if isinstance(value, dict) and key != "twin":
+        if isinstance(value, dict):
             yield from numbers(value, f"{above}{key}.")
         elif type(value) in (int, float) or (isinstance(value, list) and value):
             yield f"{above}{key}", value
@@ -133,16 +135,11 @@ def numbers(document: dict[str, Any], above: str = "") -> Iterator[tuple[str, An
 SIGNED = {
     "camera.cx", "camera.cy", "camera.distortion", "camera.camera_from_guide.rotation",
     "camera.camera_from_guide.translation", "vision.weights", "vision.threshold",
-    "vision.alternatives", "vision.unlocated.alternatives",
+    "vision.alternatives", "vision.unlocated.alternatives", "twin.shaft.set_angle",
+    "experiment.insertion.centre", "experiment.bending.centre",
 }  # fmt: skip
-"""Numbers without a scale."""
-LIMIT_NOTHING = (
-    "safety.frozen_travel",
-    "recording.",
-    "experiment.",
-    "measurement.",
-    "calibration.",
-)
+"""Numbers with a range of their own."""
+LIMIT_NOTHING = ("safety.frozen_travel", "twin.seed")
 
 
 @pytest.mark.parametrize("factor", [40.0, 57.3, 1e3, 1e6])
@@ -152,7 +149,7 @@ def test_no_limit_can_be_switched_off_by_a_wrong_unit_or_digit(factor: float) ->
 
     accepted = []
     for path, value in numbers(to_document(Config())):
-        if path in SIGNED or path.startswith(LIMIT_NOTHING) or times(value) == value:
+        if path in (*SIGNED, *LIMIT_NOTHING) or times(value) == value:
             continue
         whole = int(times(value)) if isinstance(value, int) else times(value)
         try:
@@ -162,6 +159,57 @@ def test_no_limit_can_be_switched_off_by_a_wrong_unit_or_digit(factor: float) ->
         else:
             accepted.append(path)
     assert accepted == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "field"),
+    [
+        ("drives.insertion.speed_limit", 150.0, "drives.insertion.speed_limit"),
+        ("drives.insertion.travel", [0.0, 60.0], "drives.insertion.travel"),
+        ("drives.rotation.travel", [-4500.0, 4.5], "drives.rotation.travel"),
+        ("camera.cy", 285e3, "camera.cy"),
+        ("camera.camera_from_guide.translation", [13.5, 14, 15], "translation"),
+        ("camera.camera_from_guide.rotation", [18.3, 0, 0], "rotation"),
+        ("camera.distortion", [1e6, 0, 0, 0, 0, 0, 0, 0], "distortion"),
+        ("vision.threshold", 1000.0, "vision.threshold"),
+        ("vision.weights", [-525.0, 1000.0, -648.0], "vision.weights"),
+        ("vision.alternatives", [[[0, 1, 0], 4.0], [[0, 1, 0], 256]], r"alternatives\[1\]\[1\]"),
+        ("vision.unlocated.alternatives", [[[0, 1, 0], -256]], r"unlocated.alternatives\[0\]\[1\]"),
+        ("twin.latency", 80.0, "twin.latency"),
+        ("kinematics.skew", 57.3, "kinematics.skew"),
+        ("kinematics.base_position", [300.0, 0, 0], "base_position"),
+        ("experiment.insertion.period", 1e4, "experiment.insertion.period"),
+        ("measurement.position_deviation", 0.5, "measurement.position_deviation"),
+    ],
+)
+def test_numbers_with_signs_and_those_of_motors_have_ranges(
+    key: str, value: Any, field: str
+) -> None:
+    config = load_config(config_file("bench"))
+    with pytest.raises(ConfigError, match=field):
+        config.replace(**{key: value})
+
+
+@pytest.mark.parametrize(("matrix", "most"), [((), 24.0), (((0.5, 0.5), (0.5, -0.5)), 24.0)])
+def test_the_travel_of_a_motor_is_of_the_order_of_its_commands(
+    matrix: tuple[tuple[float, float], ...], most: float
+) -> None:
+    """Of DOFs with commands of up to 0.8 rad."""
+    document = to_document(axes(2, width_limit=0.4, unit="rad"))
+    for dof in document["dof"]:
+        dof["range"] = [-0.8, 0.8]
+    motor = {"counts_per_unit": 1e4, "speed_limit": 1.0}
+    names = [f"m_{n}" for n in (1, 2)] if matrix else [dof["name"] for dof in document["dof"]]
+    if matrix:
+        document["actuators"] = {"matrix": matrix, "names": names, "units": ["rad", "rad"]}
+    for end, is_allowed in ((most * 0.99, True), (most * 1.01, False)):
+        motors = {
+            name: {**motor, "node": node, "travel": [-1.0, end]}
+            for node, name in enumerate(names, 1)
+        }
+        document["drives"] = {"motors": motors}
+        with nullcontext() if is_allowed else pytest.raises(ConfigError, match=r"m.*travel"):
+            from_document(document)
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,7 @@ def test_a_changed_measurement_is_found(mixed: tuple[Path, Recording]) -> None:
 
 def test_another_configuration_gives_other_estimates(mixed: tuple[Path, Recording]) -> None:
     log = read_log(mixed[0])
-    doubted = log.config.replace(**{"measurement.tip_deviation": 0.5})
+    doubted = log.config.replace(**{"measurement.tip_deviation": 0.3})
     replayed, skipped = estimate_from_log(log, doubted)
     assert skipped == 0
     assert len(replayed.frames) == len(mixed[1].frames)

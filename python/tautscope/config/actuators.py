@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from tautscope.config.axes import DofEntry, Name
 from tautscope.config.drives import DrivesConfig
-from tautscope.config.fields import LIMITS
+from tautscope.config.fields import LIMITS, MOST_RATIO
+from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, require
+from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 
@@ -54,7 +56,10 @@ class ActuatorsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 def check_motors(
-    drives: DrivesConfig, actuators: ActuatorsConfig | None, dofs: Sequence[DofEntry]
+    drives: DrivesConfig,
+    actuators: ActuatorsConfig | None,
+    dofs: Sequence[DofEntry],
+    safety: SafetyConfig,
 ) -> None:
     """Check that section ``drives`` has the motors of the robot; keys from the root."""
     if bool(drives.motors) != bool(dofs):
@@ -62,7 +67,10 @@ def check_motors(
         allowed = "[drives.motors.NAME] with [[dof]], else insertion, rotation and bending"
         raise ConfigError("drives", found, allowed)
     if not dofs:
+        for dof, limits in zip(Dof, safety.command_travel, strict=True):
+            _check_travel(dof.key, drives[dof].travel, max(map(abs, limits)))
         return
+    reach = np.array([max(map(abs, dof.travel)) for dof in dofs])
     if actuators is None:
         names, units = [dof.name for dof in dofs], [str(dof.unit) for dof in dofs]
     elif len(actuators.names) == len(actuators.units) > 0:
@@ -72,9 +80,22 @@ def check_motors(
         raise ConfigError("actuators.names", list(actuators.names), allowed)
     if list(drives.motors) != names:
         raise ConfigError("drives.motors", list(drives.motors), f"in this order {names}")
-    for (name, motor), unit in zip(drives.motors.items(), units, strict=True):
+    if actuators is not None:
+        reach = (
+            np.abs(actuators.matrix) @ reach if actuators.matrix else np.full(len(names), np.inf)
+        )
+        reach += np.abs(actuators.offsets or 0.0)
+    for (name, motor), unit, farthest in zip(drives.motors.items(), units, reach, strict=True):
         if motor.unit != unit:
             raise ConfigError(f"drives.motors.{name}.unit", motor.unit, repr(unit))
+        _check_travel(f"drives.motors.{name}", motor.travel, farthest)
+
+
+def _check_travel(key: str, travel: tuple[float, float], reach: float) -> None:
+    """Check that a motor's travel is of the order of the farthest that commands move it."""
+    most = MOST_RATIO * reach
+    allowed = f"within -{most:.3g} to {most:.3g}: commands move it by {reach:.3g}"
+    require(max(map(abs, travel)) <= most, f"{key}.travel", travel, allowed)
 
 
 def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry]) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from tautscope._core import MOST_RANGE, SPEED
-from tautscope.config.fields import LIMITS, Gain, NonNegative, Positive, Vector3
+from tautscope.config.fields import LIMITS, Angle, Gain, NonNegative, Position, Positive, Rotation
 from tautscope.config.section import Section, require, require_at_most
 
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
@@ -34,7 +34,7 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     friction: str = ""
     """DOFs of one name share one friction, as a shaft that slides and turns in a channel; without a
     name it has its own."""
-    lever: Annotated[float, Meta(gt=0, le=100)] = 1.0
+    lever: Annotated[float, Meta(ge=1e-5, le=100)] = 1.0
     """Of one that shares a friction: motion of the rubbing surface over its own [m/rad], 1 for a
     translation."""
     expected_width: Positive | None = None
@@ -104,13 +104,13 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     without: tuple[Name, ...] = ()
     """DOFs that do not move the tip, as of a gripper, with "two_planes" and "segments"; a `Tip` of
     another sensor measures them."""
-    skew: float = 0.0
+    skew: Angle = 0.0
     """Of "two_planes": angle from bend_x to bend_y about z, less a right angle [rad]."""
-    base_position: Vector3 = (0.0, 0.0, 0.0)
+    base_position: Position = (0.0, 0.0, 0.0)
     """Origin of the kinematics in the frame of the sensor that measures poses [m]."""
-    base_rotation: Vector3 = (0.0, 0.0, 0.0)
+    base_rotation: Rotation = (0.0, 0.0, 0.0)
     """Rotation vector that turns the kinematics into that frame [rad]."""
-    sensor_rotation: Vector3 = (0.0, 0.0, 0.0)
+    sensor_rotation: Rotation = (0.0, 0.0, 0.0)
     """Rotation vector of the sensor at the tip against the tip of the kinematics [rad]."""
 
 

@@ -6,21 +6,26 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import Positive, Vector3
+from tautscope.config.fields import Position, Positive, Rotation
 from tautscope.config.section import Section
 
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
 Deinterlace = Literal["bwdif", "always", "none"]
 CameraClock = Literal["stream", "device", "arrival"]
-Vector8 = tuple[float, float, float, float, float, float, float, float]
+Pixel = Annotated[float, Meta(ge=-8192, le=16384)]
+Coefficient = Annotated[float, Meta(ge=-1000, le=1000)]
+Vector8 = tuple[
+    Coefficient, Coefficient, Coefficient, Coefficient,
+    Coefficient, Coefficient, Coefficient, Coefficient,
+]  # fmt: skip
 
 
 class PoseConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pose of the guide, where the instrument leaves the scope, in the camera frame."""
 
-    translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
+    translation: Position = (13.5e-3, 14e-3, 15e-3)
     """Origin of the guide in the camera frame: x right, y down, z forward [m] [ours]."""
-    rotation: Vector3 = (0.32, -0.26, 0.0)
+    rotation: Rotation = (0.32, -0.26, 0.0)
     """Rotation vector from guide to camera coordinates [rad]; the guide's z axis is that of the
     channel, outwards [ours]."""
 
@@ -72,9 +77,9 @@ class CameraConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Focal length along x [px] [public colonoscope calibration]."""
     fy: Positive = 454.0
     """Focal length along y [px]; DV pixels are not square."""
-    cx: float = 349.6
+    cx: Pixel = 349.6
     """Principal point, u [px]."""
-    cy: float = 285.0
+    cy: Pixel = 285.0
     """Principal point, v [px]."""
     distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
     """k1, k2, p1, p2, k3, k4, k5, k6, as in OpenCV [ours]."""

@@ -18,15 +18,9 @@ from tautscope.config.control import DofConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.fields import MOST_RATIO
 from tautscope.config.safety import SafetyConfig
-from tautscope.config.section import require, require_defaults, require_names
+from tautscope.config.section import default_of, require, require_defaults, require_names
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-
-RANGED = (
-    "law", "estimation", "insertion", "rotation", "bending", "instrument", "camera", "control",
-    "safety", "kinematics", "vision",
-)  # fmt: skip
-"""Sections in which `MOST_RATIO` holds for every number whose type has no upper limit."""
 
 
 def check_references(
@@ -103,7 +97,7 @@ def check_topics(
 
 
 def check_ranges(config: Struct) -> None:
-    """Check that numbers are of the order of their defaults."""
+    """Check that numbers whose type has no upper limit are of the order of their defaults."""
     unusual: tuple[str, ...] = config.safety.unusual  # type: ignore[attr-defined]
     ranges = _ranges(type(config))
     for key, index, low, high in ranges:
@@ -121,8 +115,9 @@ def check_ranges(config: Struct) -> None:
 @cache
 def _ranges(config: type[Struct]) -> tuple[tuple[str, int | None, float, float], ...]:
     """Key, index in a list, least and largest value of the numbers without a limit."""
-    factories = {field.name: field.default_factory for field in fields(config)}
-    return tuple(one for name in RANGED for one in _ranged(name, factories[name]()))
+    made = {each.name: default_of(each) for each in fields(config)}
+    sections = {name: section for name, section in made.items() if isinstance(section, Struct)}
+    return tuple(one for name, section in sections.items() for one in _ranged(name, section))
 
 
 def _ranged(path: str, default: Struct) -> Iterator[tuple[str, int | None, float, float]]:

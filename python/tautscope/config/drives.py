@@ -34,6 +34,8 @@ WAIVERS: dict[Waiver, str] = {
 }
 """When each waiver is right; it completes "if ..." in messages."""
 
+FASTEST = 100.0
+"""Most widths of `AxisConfig.travel` per s: more is a speed in mm/s or deg/s."""
 Timeout = Annotated[float, Meta(gt=0, le=60)]
 """Limited like all that limits depend on: milliseconds given for seconds would switch them off."""
 _OF_CIA_402 = (
@@ -195,6 +197,9 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             require(owner is None, f"{path}.node", axis.node, f"not that of {owner}")
             taken[axis.node] = motor.label
             require(axis.travel[0] < axis.travel[1], f"{path}.travel", axis.travel, LIMITS)
+            fastest = FASTEST * (axis.travel[1] - axis.travel[0])
+            allowed = f"at most {fastest:.3g}: {FASTEST:g} times the width of travel per s"
+            require(axis.speed_limit <= fastest, f"{path}.speed_limit", axis.speed_limit, allowed)
             require(
                 max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,
                 f"{path}.counts_per_unit",

@@ -9,6 +9,12 @@ NonNegative = Annotated[float, Meta(ge=0)]
 Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1, le=50)]
 Vector3 = tuple[float, float, float]
+Angle = Annotated[float, Meta(ge=-7, le=7)]
+"""Of any rotation in rad; in degrees most are more."""
+Coordinate = Annotated[float, Meta(ge=-10, le=10)]
+"""Of a position in m, or a time in s; in mm and ms most are more."""
+Rotation = tuple[Angle, Angle, Angle]
+Position = tuple[Coordinate, Coordinate, Coordinate]
 PerDof = tuple[Positive, Positive, Positive]
 """One each for insertion, rotation and bending."""
 LIMITS = "the lower limit, then the upper"

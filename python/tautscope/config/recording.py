@@ -29,5 +29,5 @@ class RecordingConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=
     """Queue length for ticks and image updates; more are dropped with a warning."""
     queue_images: Annotated[int, Meta(ge=1)] = 50
     """The same for images."""
-    close_timeout: Positive = 10.0
+    close_timeout: Annotated[float, Meta(gt=0, le=300)] = 10.0
     """Longest wait for the disk at the end of a run [s]."""

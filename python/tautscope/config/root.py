@@ -90,7 +90,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if self.actuators is not None:
             check_actuators(self.actuators, self.dof)
         if self.drives is not None:
-            check_motors(self.drives, self.actuators, self.dof)
+            check_motors(self.drives, self.actuators, self.dof, self.safety)
 
     @property
     def dofs(self) -> tuple[NamedDof, ...]:

@@ -6,9 +6,10 @@ from typing import Annotated
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import NonNegative, Positive, Vector3
+from tautscope.config.fields import Angle, Coordinate, NonNegative, Positive, Rotation
 from tautscope.config.section import Section, require, require_at_most, require_names
 
+Small = Annotated[float, Meta(ge=0, le=10)]
 Slope = Annotated[float, Meta(gt=-1, lt=1)]
 
 DISTURBANCES = (
@@ -60,7 +61,7 @@ class ShaftConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True
     set_torque: NonNegative = 2e-4
     """Amplitude of the torque on each segment, sinusoidal in its angle, by which a shaft with a
     permanent curvature (set) rotates unevenly in a bent channel [N m]."""
-    set_angle: float = 1.2
+    set_angle: Angle = 1.2
     """Angle at which that torque is zero [rad]."""
 
 
@@ -92,9 +93,9 @@ class CableConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Linear and quadratic variation of the curvature along the section, in which friction aside it
     is proportional to 1 + linear x + quadratic (3 x^2 - 1) / 2, but at least to 0.1; x from -1 at
     the proximal to 1 at the distal end."""
-    plane: float = 0.0
+    plane: Angle = 0.0
     """Angle of the plane of bending at zero rotation [rad]."""
-    compliance: NonNegative = 0.0
+    compliance: Annotated[float, Meta(ge=0, le=1e-3)] = 0.0
     """Shortening of the section per tension of both cables [m/N]; the cables slacken with it. Below
     6.7e-6 none."""
 
@@ -109,7 +110,7 @@ class FrictionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Of shaft and section [share]: amplitude of a sine over time."""
     time_period: Positive = 40.0
     """Period of that sine [s]."""
-    stick: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    stick: tuple[Small, Small] = (0.0, 0.0)
     """Increase of the friction of shaft and section at rest [share], which falls with speed: parts
     move by stick-slip."""
 
@@ -123,25 +124,25 @@ class TransmissionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_on
 
     gain: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
     """Travel of the end over travel of the motor."""
-    offset: Vector3 = (0.0, 0.0, 0.0)
+    offset: Rotation = (0.0, 0.0, 0.0)
     """Position of the end minus that of the motor in the start posture [m, rad, rad]: the contact
     offsets become asymmetric."""
-    slack: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    slack: tuple[Small, Small, Small] = (0.0, 0.0, 0.0)
     """Travel of the motor about the start posture, in mid-stroke, that moves nothing
     [m, rad, rad]."""
-    lag: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    lag: tuple[Small, Small, Small] = (0.0, 0.0, 0.0)
     """Time constant by which the end follows the motor [s]."""
 
 
 class SensorConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Timing, exposure and compression of the camera's images. All [ours]."""
 
-    stamp_error: float = 0.0
+    stamp_error: Coordinate = 0.0
     """Stamped minus true time of capture [s]."""
-    readout: NonNegative = 0.0
+    readout: Small = 0.0
     """Time from the capture of the first to that of the last row (rolling shutter) [s]; at most one
     frame period. The stamp is the time of the middle row."""
-    exposure_time_constant: NonNegative = 0.0
+    exposure_time_constant: Small = 0.0
     """Time constant of the automatic exposure [s]; 0 for a constant exposure."""
     exposure_target: Annotated[float, Meta(gt=0, lt=255)] = 105.0
     """Mean grey level that the automatic exposure aims at."""

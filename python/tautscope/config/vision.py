@@ -6,8 +6,11 @@ from typing import Annotated
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import Fraction, Positive, Vector3
-from tautscope.config.section import Section
+from tautscope.config.fields import Fraction, Positive
+from tautscope.config.section import Section, require
+
+Weight = Annotated[float, Meta(ge=-100, le=100)]
+Weights = tuple[Weight, Weight, Weight]
 
 
 class OutlineFitConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -48,7 +51,7 @@ class ClearConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True
 class UnlocatedConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Search in an image of which the posture is not known [all ours]."""
 
-    alternatives: tuple[tuple[Vector3, float], ...] = (((-0.5, 1.0, -0.5), 4.0),)
+    alternatives: tuple[tuple[Weights, float], ...] = (((-0.5, 1.0, -0.5), 4.0),)
     """Weights and threshold that are tried after `VisionConfig.alternatives`: for dark or smoky
     images in which a band is hardly greener than grey."""
     certain_edges: Fraction = 0.9
@@ -90,11 +93,11 @@ class BlurConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
 class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Marker detection, Eq. (12) and Fig. 5. All [ours]."""
 
-    weights: Vector3 = (-0.525, 1.0, -0.648)
+    weights: Weights = (-0.525, 1.0, -0.648)
     """Fisher's discriminant: weights of blue, green, red [fitted to labelled pixels]."""
     threshold: float = 5.0
     """A pixel is marker if its weighted sum exceeds this [grey levels]."""
-    alternatives: tuple[tuple[Vector3, float], ...] = (
+    alternatives: tuple[tuple[Weights, float], ...] = (
         ((-0.8, 1.0, -0.8), 5.0),
         ((-0.45, 1.0, -0.55), 8.0),
         ((-0.525, 1.0, -0.648), 40.0),
@@ -134,3 +137,16 @@ class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     clear: ClearConfig = field(default_factory=ClearConfig)
     unlocated: UnlocatedConfig = field(default_factory=UnlocatedConfig)
     blur: BlurConfig = field(default_factory=BlurConfig)
+
+    def _check(self) -> None:
+        """A pixel can exceed each threshold, or be below it."""
+        every = {"": (self.weights, self.threshold)}
+        for path, pairs in (
+            ("alternatives", self.alternatives),
+            ("unlocated.alternatives", self.unlocated.alternatives),
+        ):
+            every |= {f"{path}[{index}]": pair for index, pair in enumerate(pairs)}
+        for path, (weights, threshold) in every.items():
+            most = 255 * sum(map(abs, weights))
+            field = f"{path}[1]" if path else "threshold"
+            require(abs(threshold) <= most, field, threshold, f"at most 255 |weights| = {most:g}")
