@@ -1,17 +1,76 @@
-"""The defaults of the Rust crates and of the C interface are those of Python."""
+"""Defaults and ranges of the Rust crates and of the C interface are those of Python."""
 
 import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
+import msgspec.inspect as types
+import pytest
+import tomlkit
 from common.paths import ROOT
 from tautscope import axes
-from tautscope.config import dump_config
+from tautscope.config import Config, dump_config
+from tautscope.config.checks import ranges
+from tautscope.config.fields import MOST_RATIO
+from tautscope.config.safety import _TRAVEL
 
-DEFAULTS = ROOT / "crates" / "config" / "src" / "defaults.toml"
+SOURCE = ROOT / "crates" / "config" / "src"
 
 
-def test_the_defaults_in_rust_are_these() -> None:
-    text = dump_config(axes(1, width_limit=1.0))
+def defaults() -> str:
+    return dump_config(axes(1, width_limit=1.0))
+
+
+def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, list[float]]]:
+    """Key, least and largest value of the numbers whose type has an upper limit."""
+    match kind:
+        case types.StructType(fields=fields):
+            for field in fields:
+                yield from bounds(f"{path}.{field.name}".lstrip("."), field.type)
+        case types.FloatType() | types.IntType():
+            low, high = kind.ge if kind.gt is None else kind.gt, kind.le or kind.lt
+            if high is not None:
+                assert low is not None, path
+                yield path, [float(low), float(high)]
+        case types.UnionType(types=members):
+            for member in members:
+                yield from bounds(path, member)
+        case types.TupleType(item_types=(item, *others)) if all(one == item for one in others):
+            yield from bounds(path, item)
+        case types.VarTupleType(item_type=types.StructType() as item):
+            yield from bounds(path, item)
+
+
+def limits() -> str:
+    """A table of the ranges that a key named in safety.unusual leaves, and one of all others."""
+    usual: dict[str, Any] = {}
+    for key, index, *ends in ranges(Config):
+        pair = [float(f"{end:.3g}") for end in ends]
+        if index is None:
+            usual[key] = pair
+        else:
+            usual.setdefault(key, []).append(pair)
+    far = [MOST_RATIO * max(map(abs, limits)) for limits in _TRAVEL]
+    usual["safety.command_travel"] = [[-one, one] for one in far]
+    read = tuple(f"{name}." for name in tomlkit.parse(defaults()) if name not in UNREAD)
+    tables = {"usual": usual, "always": dict(bounds("", types.type_info(Config)))}
+    return tomlkit.dumps(
+        {
+            name: {key: found for key, found in table.items() if key.startswith(read)}
+            for name, table in tables.items()
+        }
+    )
+
+
+UNREAD = ("twin", "recording", "calibration", "kinematics")
+"""Sections that only Python reads."""
+
+
+@pytest.mark.parametrize(("file", "text"), [("defaults", defaults), ("ranges", limits)])
+def test_those_in_rust_are_these(file: str, text: Any) -> None:
+    path: Path = SOURCE / f"{file}.toml"
     if "TAUTSCOPE_WRITE_DEFAULTS" in os.environ:
-        DEFAULTS.write_text(text, encoding="utf-8")
-    found = DEFAULTS.read_text(encoding="utf-8")
-    assert found == text, f"write it: TAUTSCOPE_WRITE_DEFAULTS=1 uv run pytest {__file__}"
+        path.write_text(text(), encoding="utf-8")
+    found = path.read_text(encoding="utf-8") if path.exists() else ""
+    assert found == text(), f"write it: TAUTSCOPE_WRITE_DEFAULTS=1 uv run pytest {__file__}"

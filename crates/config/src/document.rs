@@ -51,6 +51,8 @@ impl From<toml::de::Error> for Error {
 
 /// The defaults, with a degree of freedom of `[[dof]]`; written by `tests/config/test_rust_defaults.py`.
 const DEFAULTS: &str = include_str!("defaults.toml");
+/// Ranges of the numbers; written by the same test.
+const RANGES: &str = include_str!("ranges.toml");
 /// Keys of `[[dof]]` without a default.
 const OPTIONAL: [&str; 6] = [
     "name",
@@ -78,15 +80,14 @@ const OF_ARTICLE: [&str; 11] = [
 const OF_AXES: [&str; 5] = ["control", "safety", "law", "estimation", "measurement"];
 /// Sections without defaults that only Python reads.
 const OF_PYTHON: [&str; 2] = ["drives", "actuators"];
-/// Numbers of the marker detection that may be negative.
-const SIGNED: [&str; 3] = ["weights", "threshold", "alternatives"];
 
 impl Configuration {
     /// A configuration from TOML: of the article's instrument, or with `[[dof]]` of a robot of yours.
     ///
     /// # Errors
     /// The text is not TOML, a key is unknown or, with `[[dof]]`, of another instrument, or a degree of freedom has no name or a wrong
-    /// unit; or a number is not finite, or of the marker detection negative. Other values are checked where they are read.
+    /// unit; or a number is not finite, or out of its range and not named in `safety.unusual`. Other values are checked where they are
+    /// read.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let mut given: Table = toml::from_str(text)?;
         let mut table: Table = toml::from_str(DEFAULTS)?;
@@ -127,8 +128,10 @@ impl Configuration {
             let names = [("insertion", "m"), ("rotation", "rad"), ("bending", "rad")];
             names.map(|(name, unit)| Dof::new(name, unit)).into()
         };
+        let ranges: Ranges = toml::from_str(RANGES)?;
+        let unusual = ranges.named(&table)?;
         for (name, value) in &table {
-            check_numbers(value, name)?;
+            ranges.check(value, name, &unusual)?;
         }
         Ok(Self { table, dofs })
     }
@@ -194,22 +197,81 @@ fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Er
     Ok((Value::Array(all), dofs))
 }
 
-/// No comparison with a number that is not finite would hold, so that each check with it would be off.
-fn check_numbers(value: &Value, name: &str) -> Result<(), Error> {
-    let may_be_negative =
-        !name.starts_with("vision.") || SIGNED.iter().any(|key| name.ends_with(key));
-    match value {
-        Value::Table(own) => own
-            .iter()
-            .try_for_each(|(key, value)| check_numbers(value, &format!("{name}.{key}"))),
-        Value::Array(all) => all.iter().try_for_each(|value| check_numbers(value, name)),
-        Value::Float(number) if !number.is_finite() => Err(Error(format!(
-            "{name}: got {number}, expected a finite number"
-        ))),
-        Value::Float(number) if *number < 0.0 && !may_be_negative => {
-            Err(Error(format!("{name}: got {number}, expected 0 or above")))
+/// Least and largest values by key: a pair, or one for each item of a list.
+#[derive(serde::Deserialize)]
+struct Ranges {
+    /// Of the keys that `safety.unusual` may name.
+    usual: Table,
+    always: Table,
+}
+
+impl Ranges {
+    /// The keys that `safety.unusual` names.
+    fn named(&self, table: &Table) -> Result<Vec<String>, Error> {
+        let names = table.get("safety").and_then(|own| own.get("unusual"));
+        let names: Vec<String> = names.cloned().map_or(Ok(Vec::new()), Value::try_into)?;
+        match names.iter().find(|name| !self.usual.contains_key(*name)) {
+            Some(name) => Err(Error(format!(
+                "safety.unusual: got {name:?}, expected the key of a number with a usual range"
+            ))),
+            None => Ok(names),
         }
-        _ => Ok(()),
+    }
+
+    /// No comparison with a number that is not finite would hold, so that each check with it would be off; a wrong unit does the same.
+    fn check(&self, value: &Value, name: &str, unusual: &[String]) -> Result<(), Error> {
+        match value {
+            Value::Table(own) => own
+                .iter()
+                .try_for_each(|(key, value)| self.check(value, &format!("{name}.{key}"), unusual)),
+            Value::Array(all) if all.iter().all(Value::is_table) => all
+                .iter()
+                .try_for_each(|value| self.check(value, name, unusual)),
+            _ if unusual.iter().any(|key| key == name) => check_number(value, name, None, ""),
+            _ => match self.usual.get(name) {
+                None => check_number(value, name, self.always.get(name), ""),
+                range => check_number(value, name, range, ", or named in safety.unusual"),
+            },
+        }
+    }
+}
+
+/// A number, or each of a list.
+fn check_number(
+    value: &Value,
+    name: &str,
+    range: Option<&Value>,
+    waiver: &str,
+) -> Result<(), Error> {
+    #[expect(clippy::cast_precision_loss, reason = "compared with a limit")]
+    let number = match value {
+        Value::Array(all) => {
+            let ranges = range.and_then(Value::as_array);
+            let of_items = ranges.filter(|ranges| ranges.iter().all(Value::is_array));
+            return all.iter().enumerate().try_for_each(|(index, value)| {
+                let own = of_items.map_or(range, |ranges| ranges.get(index));
+                check_number(value, name, own, waiver)
+            });
+        }
+        Value::Float(number) => *number,
+        Value::Integer(number) => *number as f64,
+        _ => return Ok(()),
+    };
+    if !number.is_finite() {
+        return Err(Error(format!(
+            "{name}: got {number}, expected a finite number"
+        )));
+    }
+    let Some((low, high)) = range.and_then(|range| range.clone().try_into::<(f64, f64)>().ok())
+    else {
+        return Ok(());
+    };
+    if (low..=high).contains(&number) {
+        Ok(())
+    } else {
+        Err(Error(format!(
+            "{name}: got {number}, expected {low} to {high}{waiver}"
+        )))
     }
 }
 

@@ -113,12 +113,8 @@ fn errors_name_the_key() {
             "vision.least_inside: got NaN",
         ),
         (
-            "vision.fit.edge_deviation = -1.0".into(),
-            "vision.fit.edge_deviation: got -1, expected 0 or above",
-        ),
-        (
-            "control.history = 2e6".into(),
-            "history: got 2000000, expected at most 1024 control periods",
+            "control.history = 60".into(),
+            "history: got 60, expected at most 1024 control periods",
         ),
         (dof("[control]\nhistory = 2e6"), "history: got 2000000"),
         (dof("range = [-inf, inf]"), "dof.range: got -inf"),
@@ -157,4 +153,55 @@ fn errors_name_the_key() {
         let found = error(&text);
         assert!(found.contains(words), "{text}: {found}");
     }
+}
+
+#[test]
+fn numbers_have_the_ranges_of_python() {
+    let dof = |keys: &str| format!("{ONE}{keys}");
+    for (text, words) in [
+        (
+            "vision.fit.edge_deviation = -1.0".into(),
+            "vision.fit.edge_deviation: got -1, expected 0.0167 to 15, or named in safety.unusual",
+        ),
+        (
+            "control.history = 2e6".into(),
+            "control.history: got 2000000, expected 0.0667 to 60",
+        ),
+        (
+            "safety.width_limit = [12.0, 2.6, 1.5]".into(),
+            "safety.width_limit: got 12, expected 0.0004 to 0.36, or named in safety.unusual",
+        ),
+        (
+            "safety.command_travel = [[-0.1, 0.3], [-12.6, 722], [-4, 4]]".into(),
+            "safety.command_travel: got 722, expected -378 to 378",
+        ),
+        (
+            "safety.good_frames = 151".into(),
+            "safety.good_frames: got 151",
+        ),
+        (
+            "camera.cx = 285e3".into(),
+            "camera.cx: got 285000, expected -8192 to 16384",
+        ),
+        (
+            "safety.unusual = [\"safety.stal\"]".into(),
+            "safety.unusual: got \"safety.stal\"",
+        ),
+        (
+            dof("lever = 1e-6"),
+            "dof.lever: got 0.000001, expected 0.00001 to 100",
+        ),
+        (dof("[safety]\nstall = 1e4"), "safety.stall: got 10000"),
+    ] {
+        let found = error(&text);
+        assert!(found.contains(words), "{text}: {found}");
+    }
+}
+
+#[test]
+fn an_unusual_number_is_allowed_by_name() {
+    let stall = "[safety]\nunusual = [\"safety.stall\"]\nstall = 1e4";
+    assert!(Configuration::parse(stall).is_ok());
+    let nan = stall.replace("1e4", "nan");
+    assert!(error(&nan).contains("safety.stall: got NaN"));
 }

@@ -99,8 +99,8 @@ def check_topics(
 def check_ranges(config: Struct) -> None:
     """Check that numbers whose type has no upper limit are of the order of their defaults."""
     unusual: tuple[str, ...] = config.safety.unusual  # type: ignore[attr-defined]
-    ranges = _ranges(type(config))
-    for key, index, low, high in ranges:
+    usual = ranges(type(config))
+    for key, index, low, high in usual:
         value = attrgetter(key)(config)
         one = value if index is None else value[index]
         if not (low <= one <= high or key in unusual):
@@ -108,12 +108,12 @@ def check_ranges(config: Struct) -> None:
             allowed = f"{low:.3g} to {high:.3g}, or {key} named in safety.unusual"
             raise ConfigError(path, one, allowed)
     if unusual:
-        known = {"safety.command_travel", *(key for key, *_ in ranges)}
+        known = {"safety.command_travel", *(key for key, *_ in usual)}
         require_names("safety.unusual", unusual, sorted(known))
 
 
 @cache
-def _ranges(config: type[Struct]) -> tuple[tuple[str, int | None, float, float], ...]:
+def ranges(config: type[Struct]) -> tuple[tuple[str, int | None, float, float], ...]:
     """Key, index in a list, least and largest value of the numbers without a limit."""
     made = {each.name: default_of(each) for each in fields(config)}
     sections = {name: section for name, section in made.items() if isinstance(section, Struct)}
