@@ -112,7 +112,8 @@ def test_a_motor_by_its_name_ends_the_run(tmp_path: Path) -> None:
 def test_a_limit_of_the_microcontroller_is_named_with_the_motor_of_a_robot(tmp_path: Path) -> None:
     document = robot_document("serial", tmp_path, 2)
     right = from_document(document)
-    document["drives"]["motors"]["joint_2"]["travel"] = [-1.5e6, 0.0]
+    far = {"counts_per_unit": 8e7, "travel": [-25.0, 0.0], "speed_limit": 1e-4}
+    document["drives"]["motors"]["joint_2"] |= far
     assert right.drives is not None
     with ExitStack() as stack:
         stack.enter_context(make_motors(right.drives, stack, start=np.zeros(2)))

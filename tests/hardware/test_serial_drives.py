@@ -180,7 +180,11 @@ def test_fault_persists_until_it_is_reset(tmp_path: Path) -> None:
     ("changes", "error", "message"),
     [
         ({"node": 4}, SettingRefusedError, "has 3 axes. Correct drives.rotation.node"),
-        ({"travel": [-3e6, 0.0]}, SettingRefusedError, "takes -1073741824 to 1073741824"),
+        (
+            {"counts_per_unit": 1e7, "travel": [-200.0, 0.0], "speed_limit": 1e-3},
+            SettingRefusedError,
+            "takes -1073741824 to 1073741824",
+        ),
         ({"speed_limit": 40.0}, SettingRefusedError, "20000 counts/s, .* reaches 10000"),
     ],
 )

@@ -271,7 +271,7 @@ def test_a_stop_while_servos_are_enabled_holds_them_where_the_reset_left_them(
             "rotation.node.*ids [123, ]+ answer at 1000000",
         ),  # each, unless the computer is busy
         ({}, ModeRefusedError, "it is a .* not a .*Correct drives.rotation.model"),
-        ({"travel": [-1e4, 0.0]}, SettingRefusedError, "It counts to"),
+        ({"counts_per_unit": 1e5, "travel": [-100.0, 0.0]}, SettingRefusedError, "It counts to"),
     ],
     ids=["id", "model", "turns"],
 )

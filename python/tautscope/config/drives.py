@@ -34,7 +34,7 @@ WAIVERS: dict[Waiver, str] = {
 }
 """When each waiver is right; it completes "if ..." in messages."""
 
-FASTEST = 100.0
+FASTEST = 1000.0
 """Most widths of `AxisConfig.travel` per s: more is a speed in mm/s or deg/s."""
 Timeout = Annotated[float, Meta(gt=0, le=60)]
 """Limited like all that limits depend on: milliseconds given for seconds would switch them off."""
