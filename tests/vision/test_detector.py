@@ -123,10 +123,22 @@ def test_what_is_not_an_image_is_refused(image: Image) -> None:
             call(image)
 
 
-@pytest.mark.parametrize("weights", [[0.0, 0.0, 0.0], [1e-12, 0.0, 0.0], [1.0, 1e300, 0.0]])
-def test_a_discriminant_that_tells_nothing_apart_is_refused(weights: list[float]) -> None:
-    with pytest.raises(ConfigError, match=r"^vision\.weights: got .* expected finite weights"):
-        MarkerDetector(config((20, 30), **{"vision.weights": weights}))
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"weights": [0.0, 0.0, 0.0]}, r"weights: got .* expected finite weights"),
+        ({"weights": [1e-12, 0.0, 0.0]}, r"weights: got .* expected finite weights"),
+        ({"weights": [1.0, 1e300, 0.0]}, r"weights\[1\]: got 1e\+300"),
+        ({"threshold": 1e3}, r"threshold: got '1000.0', expected .* weighted sum of a pixel"),
+        ({"alternatives": [[[0, 1, 0], -256.0]]}, "alternatives: got '-256.0'"),
+        ({"unlocated.alternatives": [[[0, 1, 0], 256.0]]}, "unlocated.alternatives: got '256.0'"),
+    ],
+)
+def test_a_discriminant_that_tells_nothing_apart_is_refused(
+    settings: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ConfigError, match=rf"^vision\.{message}"):
+        MarkerDetector(config((20, 30), **{f"vision.{key}": settings[key] for key in settings}))
 
 
 @pytest.mark.parametrize("predicted", ["near", 3.0, [1, 2, 3], [[1, 2, 3, 4]], [1, 2, 3, None, 5]])

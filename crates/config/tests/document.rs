@@ -187,10 +187,7 @@ fn numbers_have_the_ranges_of_python() {
             "safety.unusual = [\"safety.stal\"]".into(),
             "safety.unusual: got \"safety.stal\"",
         ),
-        (
-            dof("lever = 1e-6"),
-            "dof.lever: got 0.000001, expected 0.00001 to 100",
-        ),
+        (dof("lever = 101"), "dof.lever: got 101, expected 0 to 100"),
         (dof("[safety]\nstall = 1e4"), "safety.stall: got 10000"),
     ] {
         let found = error(&text);

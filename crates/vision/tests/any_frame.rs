@@ -127,6 +127,8 @@ fn invalid_discriminants_are_rejected_by_name() {
     assert_eq!(rejected([f64::INFINITY, 1.0, 1.0], 0.0), "weights");
     assert_eq!(rejected([1e300, 1.0, 1.0], 0.0), "weights");
     assert_eq!(rejected([1.0; 3], f64::NAN), "threshold");
+    assert_eq!(rejected([-0.5, 1.0, -0.5], 256.0), "threshold");
+    assert!(ColorDiscriminant::new([-0.5, 1.0, -0.5], -255.0).is_ok());
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn recognise(data: &[u8], section: Option<SectionDisc>) -> Recognition {
     let discs = Discs::at(PREDICTED);
     let settings = Settings {
         // No pixel is marker, so that there are no edges.
-        threshold: 400.0,
+        threshold: 255.0,
         ..SETTINGS
     };
     let mut detector = Detector::new(settings).unwrap();

@@ -34,7 +34,7 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     friction: str = ""
     """DOFs of one name share one friction, as a shaft that slides and turns in a channel; without a
     name it has its own."""
-    lever: Annotated[float, Meta(ge=1e-5, le=100)] = 1.0
+    lever: Annotated[float, Meta(gt=0, le=100)] = 1.0
     """Of one that shares a friction: motion of the rubbing surface over its own [m/rad], 1 for a
     translation."""
     expected_width: Positive | None = None

@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta, field
 
 from tautscope.config.fields import Fraction, Positive
-from tautscope.config.section import Section, require
+from tautscope.config.section import Section
 
 Weight = Annotated[float, Meta(ge=-100, le=100)]
 Weights = tuple[Weight, Weight, Weight]
@@ -137,16 +137,3 @@ class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     clear: ClearConfig = field(default_factory=ClearConfig)
     unlocated: UnlocatedConfig = field(default_factory=UnlocatedConfig)
     blur: BlurConfig = field(default_factory=BlurConfig)
-
-    def _check(self) -> None:
-        """A pixel can exceed each threshold, or be below it."""
-        every = {"": (self.weights, self.threshold)}
-        for path, pairs in (
-            ("alternatives", self.alternatives),
-            ("unlocated.alternatives", self.unlocated.alternatives),
-        ):
-            every |= {f"{path}[{index}]": pair for index, pair in enumerate(pairs)}
-        for path, (weights, threshold) in every.items():
-            most = 255 * sum(map(abs, weights))
-            field = f"{path}[1]" if path else "threshold"
-            require(abs(threshold) <= most, field, threshold, f"at most 255 |weights| = {most:g}")

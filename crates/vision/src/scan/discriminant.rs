@@ -38,7 +38,8 @@ impl ColorDiscriminant {
     /// largest weight is 1).
     ///
     /// # Errors
-    /// A number is not finite, or all weights are zero, or they are outside the range of the fixed-point arithmetic.
+    /// A number is not finite, or all weights are zero, or they are outside the range of the fixed-point arithmetic; no pixel reaches the
+    /// threshold, or all do.
     pub fn new(weights: [f64; 3], threshold: f64) -> Result<Self, Error> {
         let affine = Affine::new(weights, PixelFormat::Bgr);
         let finite = weights.iter().all(|weight| weight.is_finite());
@@ -46,8 +47,9 @@ impl ColorDiscriminant {
             let allowed = "finite weights of B, G, R, the largest magnitude 1e-8 to 1e6";
             return Err(Error::new("weights", &weights, allowed));
         }
-        if !threshold.is_finite() {
-            return Err(Error::new("threshold", &threshold, "a finite number"));
+        if !(-affine.reach()..=affine.reach()).contains(&threshold) {
+            let allowed = "a finite number that the weighted sum of a pixel can have";
+            return Err(Error::new("threshold", &threshold, allowed));
         }
         Ok(Self { weights, threshold })
     }
