@@ -13,7 +13,7 @@ from tautscope import axes
 from tautscope.config import Config, dump_config
 from tautscope.config.checks import ranges
 from tautscope.config.fields import MOST_RATIO
-from tautscope.config.safety import _TRAVEL
+from tautscope.config.safety import USUAL_TRAVEL
 
 SOURCE = ROOT / "crates" / "config" / "src"
 
@@ -51,7 +51,7 @@ def limits() -> str:
             usual[key] = pair
         else:
             usual.setdefault(key, []).append(pair)
-    far = [MOST_RATIO * max(map(abs, limits)) for limits in _TRAVEL]
+    far = [MOST_RATIO * max(map(abs, limits)) for limits in USUAL_TRAVEL]
     usual["safety.command_travel"] = [[-one, one] for one in far]
     read = tuple(f"{name}." for name in tomlkit.parse(defaults()) if name not in UNREAD)
     tables = {"usual": usual, "always": dict(bounds("", types.type_info(Config)))}

@@ -12,7 +12,7 @@ from tautscope.config.section import Section, require, require_names
 
 Range = tuple[float, float]
 Count = Annotated[int, Meta(ge=1)]
-_TRAVEL: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
+USUAL_TRAVEL: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
 
 
 class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -41,7 +41,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     command_speed: PerDof = (0.4, 27.0, 16.0)
     """Largest speed of the command: a faster one stops. The reference is followed at no more than
     this over `gain_limit`."""
-    command_travel: tuple[Range, Range, Range] = _TRAVEL
+    command_travel: tuple[Range, Range, Range] = USUAL_TRAVEL
     """Least and largest command [m, rad, rad]."""
     reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)
     """Resolution of the input device, or its largest step from rest [m, rad, rad]: motion stops
@@ -108,7 +108,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         require_names("off", self.off, DETECTORS)
         for index, limits in enumerate(self.command_travel):
             require(limits[0] < limits[1], f"command_travel[{index}]", limits, LIMITS)
-            most = MOST_RATIO * max(map(abs, _TRAVEL[index]))
+            most = MOST_RATIO * max(map(abs, USUAL_TRAVEL[index]))
             is_usual = max(map(abs, limits)) <= most or "safety.command_travel" in self.unusual
             require(
                 is_usual, f"command_travel[{index}]", limits, f"within -{most:.3g} to {most:.3g}"

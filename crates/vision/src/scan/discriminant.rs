@@ -38,8 +38,8 @@ impl ColorDiscriminant {
     /// largest weight is 1).
     ///
     /// # Errors
-    /// A number is not finite, or all weights are zero, or they are outside the range of the fixed-point arithmetic; no pixel reaches the
-    /// threshold, or all do.
+    /// A number is not finite, or all weights are zero, or they are outside the range of the fixed-point arithmetic; or the threshold is
+    /// larger than the largest magnitude of the weighted sum.
     pub fn new(weights: [f64; 3], threshold: f64) -> Result<Self, Error> {
         let affine = Affine::new(weights, PixelFormat::Bgr);
         let finite = weights.iter().all(|weight| weight.is_finite());
