@@ -179,10 +179,23 @@ class Peers:
 
     def enable(self, at: Floats) -> None:
         """Enable the loop with the drives at a position (n,)."""
-        self.send_position(at)
-        self.delivered()
-        self.request("enable")
+        with self.at_rest(at):
+            self.request("enable")
         assert self.control.run is not None, self.control.fault
+
+    @contextlib.contextmanager
+    def at_rest(self, at: Floats) -> Iterator[None]:
+        """Send the drives' position (n,) whenever the node waits."""
+
+        def send() -> None:
+            self.send_position(at)
+            self.delivered()
+
+        before, self.clock.before_tick = self.clock.before_tick, send
+        try:
+            yield
+        finally:
+            self.clock.before_tick = before
 
     def tick(self) -> None:
         """A tick of the node under test."""

@@ -70,6 +70,14 @@ def test_a_missing_driver_is_named(both: Peers) -> None:
     assert "Start the driver" in both.control.fault
 
 
+def test_a_position_from_before_does_not_start_motion(both: Peers) -> None:
+    both.send_position(START)
+    both.delivered()
+    both.request("enable")
+    assert both.control.run is None
+    assert "Start the driver" in both.control.fault
+
+
 def test_enable_changes_nothing_while_enabled(both: Peers) -> None:
     both.enable(START)
     run = both.control.run

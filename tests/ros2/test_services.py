@@ -37,9 +37,8 @@ def test_services_change_and_read_the_state(both: Peers, client: Client) -> None
     assert not change(3)
     assert change(1)
     assert call("get_state", "GetState", **empty).current_state.label == "inactive"
-    both.send_position(START)
-    both.delivered()
-    assert change(0, "activate")
+    with both.at_rest(START):
+        assert change(0, "activate")
     assert both.control.operating_state == "ENABLED"
     found = call("get_available_transitions", "GetAvailableTransitions", **empty)
     labels = [each.transition.label for each in found.available_transitions]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -60,11 +62,13 @@ class DriverRig:
         self._start = self._due = self._moved_at = self._frames = 0
 
     def reset(self) -> Sample:
-        """Wait for the driver's positions; the clock is at 0.
+        """Wait for new positions of the driver; the clock is at 0.
 
         Raises:
             DriveError: There are none.
         """
+        with suppress(MessageError):
+            self._positions.take()  # one from before, of any age
         self._applied = None
         self._position_stamps.reset()
         if self._images is not None:
