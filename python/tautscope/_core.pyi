@@ -20,6 +20,7 @@ __all__ = [
     "Instrument",
     "MarkerDetector",
     "Play",
+    "PostureTable",
     "Reduction",
     "Renderer",
     "StateEstimator",
@@ -242,13 +243,17 @@ class Reduction:
 # Image to markers: crates/vision.
 
 @final
+class PostureTable:
+    def __new__(cls, model: FeatureModel, states: NDArray[np.float64]) -> Self: ...
+
+@final
 class MarkerDetector:
     def __new__(
         cls,
         model: FeatureModel,
         pixel_format: str,
         settings: Mapping[str, object],
-        postures: NDArray[np.float64],
+        postures: PostureTable,
         states: NDArray[np.float64],
         std: NDArray[np.float64],
     ) -> Self: ...

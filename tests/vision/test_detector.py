@@ -180,12 +180,43 @@ def test_settings_are_exactly_those_of_the_configuration(
     change: dict[str, object], found: str
 ) -> None:
     settings = msgspec.to_builtins(Config().vision) | change
+    model = build_feature_model(Config())
     with pytest.raises(ConfigError, match=rf"^vision: got .*{found}"):
         _core.MarkerDetector(
-            build_feature_model(Config()),
+            model,
             "bgr",
             settings,
-            np.empty((0, 3)),
+            _core.PostureTable(model, np.empty((0, 3))),
             np.zeros((1, 3)),
             np.ones(3),
         )
+
+
+@pytest.mark.parametrize(
+    ("change", "is_shared"),
+    [
+        ({"vision.minimum_area": 5}, True),
+        ({"camera.source.url": "/dev/video1"}, True),
+        ({"instrument.marker_a": 3e-3}, False),
+        ({"experiment.bending.amplitude": 0.5}, False),
+        ({"camera.fx": 425.0}, False),
+        ({"camera.distortion": [-0.1, *[0.0] * 7]}, False),
+        ({"camera.camera_from_guide.rotation": [0.3, -0.2, 0.0]}, False),
+    ],
+)
+def test_detectors_of_a_geometry_share_its_postures(
+    change: dict[str, object], is_shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    MarkerDetector(Config())
+    made = []
+
+    def make(*given: object) -> object:
+        made.append(given)
+        return table(*given)
+
+    table = _core.PostureTable
+    monkeypatch.setattr(_core, "PostureTable", make)
+    changed = Config().replace(**change)
+    MarkerDetector(changed)
+    MarkerDetector(changed)
+    assert len(made) == (0 if is_shared else 1)

@@ -58,7 +58,7 @@ mod _core {
     #[pymodule_export]
     use super::tip_filter::TipFilter;
     #[pymodule_export]
-    use super::vision::{MarkerDetector, label_regions};
+    use super::vision::{MarkerDetector, PostureTable, label_regions};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

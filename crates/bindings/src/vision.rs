@@ -5,7 +5,7 @@
     reason = "PyO3 hands arguments over by value"
 )]
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 use tautscope_band_prediction::{ModelPredictor, Prior, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{
-    ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat, Segmenter,
-    Settings, Window,
+    self as vision, ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat,
+    Segmenter, Settings, Window,
 };
 
 use crate::arrays::table;
@@ -24,6 +24,19 @@ use crate::features::FeatureModel;
 use crate::frame::ArrayFrame;
 use crate::region::{Described, described};
 use crate::settings::from_mapping;
+
+/// The images of both bands in states (n, 3) that cover the workspace densely, which detectors of one model share.
+#[pyclass(frozen, module = "tautscope._core")]
+pub struct PostureTable(Arc<vision::PostureTable>);
+
+#[pymethods]
+impl PostureTable {
+    #[new]
+    fn new(model: &FeatureModel, states: Vec<[f64; 3]>) -> Self {
+        let outlines = states.iter().filter_map(|state| outlines(&model.0, *state));
+        Self(Arc::new(vision::PostureTable::new(outlines)))
+    }
+}
 
 /// Finds the markers in frames; `tautscope.loop.vision.MarkerDetector` is its public interface.
 #[pyclass(frozen, module = "tautscope._core")]
@@ -38,15 +51,15 @@ pub struct MarkerDetector {
 
 #[pymethods]
 impl MarkerDetector {
-    /// `settings` is the mapping of `VisionConfig`; `postures` (n, 3) cover the workspace densely, `states` (n, 3) with the
-    /// standard deviations `std` (3,) coarsely.
+    /// `settings` is the mapping of `VisionConfig`; `states` (n, 3) with the standard deviations `std` (3,) cover the
+    /// workspace coarsely.
     #[new]
     fn new(
         py: Python<'_>,
         model: &FeatureModel,
         pixel_format: &str,
         settings: Bound<'_, PyAny>,
-        postures: Vec<[f64; 3]>,
+        postures: &PostureTable,
         states: Vec<[f64; 3]>,
         std: [f64; 3],
     ) -> PyResult<Self> {
@@ -59,9 +72,6 @@ impl MarkerDetector {
             ..
         } = settings;
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(rejected(py))?;
-        let postures = postures
-            .iter()
-            .filter_map(|state| outlines(&model.0, *state));
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(rejected(py))?,
             model: model.0,
@@ -71,7 +81,7 @@ impl MarkerDetector {
             detector: Mutex::new(
                 Detector::new(settings)
                     .map_err(rejected(py))?
-                    .with_workspace(postures),
+                    .with_workspace(Arc::clone(&postures.0)),
             ),
         })
     }

@@ -1,9 +1,11 @@
 //! `TautscopeDetector`: the marker bands in an image, Eq. (12) and Fig. 5.
 #![allow(unsafe_code)]
 
+use std::sync::Arc;
+
 use tautscope_band_prediction::{ModelPredictor, Prior, Workspace, outlines};
 use tautscope_core as core;
-use tautscope_vision::{Detector, Frame, Image, PixelFormat};
+use tautscope_vision::{Detector, Frame, Image, PixelFormat, PostureTable};
 
 use crate::document::{config, detector_settings};
 use crate::pointers::{bytes, give, read, take_back, write};
@@ -42,7 +44,7 @@ impl TautscopeDetector {
         let model_deviation = document.vision.model_deviation;
         let detector = Detector::new(document.vision)
             .map_err(|error| config(format_args!("vision.{error}")))?
-            .with_workspace(outlines);
+            .with_workspace(Arc::new(PostureTable::new(outlines)));
         let (states, std) = document.experiment.starts();
         Ok(Self {
             detector,

@@ -1,9 +1,11 @@
 //! The marker detector: Fig. 5 as a whole.
 
+use std::sync::Arc;
+
 use crate::blur::BlurFitter;
 use crate::error::Error;
 use crate::frame_search::{Found, FrameSearch, Memory};
-use crate::recognition::{BandPredictor, BlobPostures, Outline, PostureTable, Recognition};
+use crate::recognition::{BandPredictor, BlobPostures, PostureTable, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
 use crate::settings::Settings;
 
@@ -12,7 +14,7 @@ use crate::settings::Settings;
 pub struct Detector {
     settings: Settings,
     unlocated: Settings,
-    postures: PostureTable,
+    postures: Arc<PostureTable>,
     memory: Memory,
 }
 
@@ -45,7 +47,7 @@ impl Detector {
         Ok(Self {
             unlocated: settings.unlocated(),
             settings,
-            postures: PostureTable::default(),
+            postures: Arc::default(),
             memory: Memory {
                 scanner: Scanner::new(&discriminants, smoothing, minimum_area),
                 blobs: BlobPostures::default(),
@@ -54,14 +56,10 @@ impl Detector {
         })
     }
 
-    /// With the outlines of both bands in postures that cover the workspace, which lead the search where the prior is of
-    /// several postures.
+    /// With postures that cover the workspace, which lead the search where the prior is of several postures.
     #[must_use]
-    pub fn with_workspace(self, outlines: impl Iterator<Item = [Outline; 2]>) -> Self {
-        Self {
-            postures: PostureTable::new(outlines),
-            ..self
-        }
+    pub fn with_workspace(self, postures: Arc<PostureTable>) -> Self {
+        Self { postures, ..self }
     }
 
     /// Recognises the markers.

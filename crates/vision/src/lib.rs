@@ -21,8 +21,8 @@ mod settings;
 pub use detector::Detector;
 pub use error::Error;
 pub use recognition::{
-    BandPrediction, BandPredictor, BandScore, OUTLINE_CORNERS, Outline, Recognition, Rejection,
-    SECTION_DISCS, SectionDisc,
+    BandPrediction, BandPredictor, BandScore, OUTLINE_CORNERS, Outline, PostureTable, Recognition,
+    Rejection, SECTION_DISCS, SectionDisc,
 };
 pub use scan::{
     ColorDiscriminant, Frame, Image, Labeller, MAX_REGIONS, MAX_SIDE, PixelFormat, Region, Runs,

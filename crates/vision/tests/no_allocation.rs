@@ -2,9 +2,11 @@
 
 mod support;
 
+use std::sync::Arc;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use support::{Anywhere, Discs, SETTINGS};
-use tautscope_vision::{BandPredictor, Detector, Image, PixelFormat, Settings};
+use tautscope_vision::{BandPredictor, Detector, Image, PixelFormat, PostureTable, Settings};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -92,6 +94,7 @@ fn nothing_is_allocated_where_the_posture_is_not_known_or_not_as_predicted() {
         let drawn = Discs::at(features).predict(features, [1.0; 4])?;
         Some(drawn.outlines)
     });
+    let postures = Arc::new(PostureTable::new(postures));
     let mut detector = Detector::new(SETTINGS).unwrap().with_workspace(postures);
     // Expected nowhere, and where they are not.
     let elsewhere = Anywhere::expected_at([10.0, 40.0, 10.0, 24.0]);

@@ -6,7 +6,7 @@ Pixel coordinates are OpenCV's: u to the right, v down, the centre of the first 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -167,7 +167,7 @@ class MarkerDetector:
             self._model,
             config.camera.pixel_format,
             msgspec.to_builtins(config.vision),
-            _workspace(config),
+            _posture_table(config, self._model),
             *self._starts,
         )
 
@@ -269,6 +269,26 @@ def workspace_starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.fl
     centre = [sine.centre for sine in sines]
     states = np.array([centre, *grid])
     return states, np.array([sine.amplitude for sine in sines])
+
+
+_MOST_TABLES = 8
+_tables: dict[Hashable, _core.PostureTable] = {}
+
+
+def _posture_table(config: Config, model: _core.FeatureModel) -> _core.PostureTable:
+    """Images of the bands in postures of the whole workspace; detectors of a geometry share them.
+
+    They take as long as ten images.
+    """
+    camera = config.camera
+    lens = camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion
+    key = (config.instrument, config.experiment, lens, camera.camera_from_guide)
+    table = _tables.get(key)
+    if table is None:
+        for oldest in list(_tables)[: 1 - _MOST_TABLES]:
+            _tables.pop(oldest, None)
+        table = _tables[key] = _core.PostureTable(model, _workspace(config))
+    return table
 
 
 def _workspace(config: Config) -> NDArray[np.float64]:

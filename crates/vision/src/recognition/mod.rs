@@ -14,7 +14,8 @@ mod surroundings;
 
 pub use outcome::Recognition;
 pub use outline::{OUTLINE_CORNERS, Outline};
-pub(crate) use posture_table::{BLOBS, BlobPostures, PostureTable};
+pub use posture_table::PostureTable;
+pub(crate) use posture_table::{BLOBS, BlobPostures};
 pub use prediction::{BandPrediction, BandPredictor, SECTION_DISCS, SectionDisc};
 pub use rejection::Rejection;
 pub use score::BandScore;
