@@ -53,7 +53,7 @@ impl AxisFilter {
         let [origin] = self.estimate.origin;
         let transmission = &self.estimate.transmission;
         let [unit] = transmission.unit();
-        self.plays = transmission.advance(&self.plays, &[(command - origin) / unit]);
+        transmission.advance(&mut self.plays, &[(command - origin) / unit]);
         let [tip] = self.estimate.tip(&self.plays);
         tip
     }

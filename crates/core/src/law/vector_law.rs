@@ -148,10 +148,10 @@ impl<const N: usize> VectorLaw<N> {
         })
     }
 
-    /// The plays after a motion to a command (N,) [m or rad].
-    pub fn follow(&self, plays: &Plays<N>, command: [f64; N]) -> Plays<N> {
+    /// Moves plays by a motion to a command (N,) [m or rad].
+    pub fn follow(&self, plays: &mut Plays<N>, command: [f64; N]) {
         let to = over(subtract(command, self.origin), self.transmission.unit());
-        self.transmission.advance(plays, &to)
+        self.transmission.advance(plays, &to);
     }
 
     /// The command for the next reference (N,) [m or rad], for the estimated coefficients and Birge's ratio of the last images.
@@ -228,7 +228,8 @@ impl<const N: usize> VectorLaw<N> {
         if let Some(reference) = self.reference {
             self.lead = subtract(command, reference);
         }
-        self.plays = self.follow(&self.plays, command);
+        let to = over(subtract(command, self.origin), self.transmission.unit());
+        self.transmission.advance(&mut self.plays, &to);
     }
 
     /// Moves the coefficients in use towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
@@ -282,7 +283,8 @@ impl<const N: usize> VectorLaw<N> {
         }
         let mut target = steady;
         for _ in 0..CORRECTIONS {
-            let ahead = self.transmission.advance(&self.plays, &target);
+            let mut ahead = self.plays;
+            self.transmission.advance(&mut ahead, &target);
             let tip = ahead.tip(&self.rows);
             let dofs = target
                 .iter_mut()
@@ -365,7 +367,8 @@ impl<const N: usize> VectorLaw<N> {
         for _ in 0..STEPS {
             let part = zip_with(share, step, |share, step| share * step);
             let to = zip_with(self.plays.command, part, |from, part| from + part);
-            let there = self.transmission.advance(&self.plays, &to);
+            let mut there = self.plays;
+            self.transmission.advance(&mut there, &to);
             let change = subtract(there.tip(&self.rows), now);
             let (tip, along) = (self.norm(change), self.dot(change, motion));
             let mut is_within = true;

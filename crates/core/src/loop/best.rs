@@ -265,7 +265,7 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
         let mut plays = past.plays;
         if to.time > past.time {
             for entry in ticks.chain(core::iter::once(to)) {
-                plays = self.law.follow(&plays, entry.command);
+                self.law.follow(&mut plays, entry.command);
             }
         }
         plays

@@ -185,11 +185,9 @@ impl<const N: usize> Transmission<N> {
         &self.friction
     }
 
-    /// The plays after a straight motion of the command to `to` (N,), in units.
-    #[must_use]
-    pub fn advance(&self, plays: &Plays<N>, to: &[f64; N]) -> Plays<N> {
-        let mut next = *plays;
-        let dofs = next.outputs.iter_mut().zip(&self.dofs).zip(to);
+    /// Moves the plays by a straight motion of the command to `to` (N,), in units.
+    pub fn advance(&self, plays: &mut Plays<N>, to: &[f64; N]) {
+        let dofs = plays.outputs.iter_mut().zip(&self.dofs).zip(to);
         let mut are_alone = true;
         for ((outputs, dof), to) in dofs {
             follow(&mut outputs.own, &OWN_RADII, *to);
@@ -203,15 +201,14 @@ impl<const N: usize> Transmission<N> {
                 let members = self.friction.members(group);
                 let mut own = self.dofs.iter().zip(members).filter(|(_, own)| *own);
                 if own.any(|(dof, _)| !dof.is_alone) {
-                    self.slide(members, to, &mut next.outputs);
+                    self.slide(members, to, &mut plays.outputs);
                 }
             }
         }
-        for (command, to) in next.command.iter_mut().zip(to) {
-            next.travel += (to - *command).abs();
+        for (command, to) in plays.command.iter_mut().zip(to) {
+            plays.travel += (to - *command).abs();
             *command = *to;
         }
-        next
     }
 
     /// Vector plays of the DOFs of one group.

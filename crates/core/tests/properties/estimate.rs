@@ -66,7 +66,7 @@ impl Direct {
 
     fn step(&mut self, command: f64) -> f64 {
         let to = [(command - ORIGIN) / UNIT];
-        self.plays = self.estimate.transmission.advance(&self.plays, &to);
+        self.estimate.transmission.advance(&mut self.plays, &to);
         self.estimate.tip(&self.plays)[0]
     }
 

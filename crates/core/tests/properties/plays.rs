@@ -106,7 +106,7 @@ fn check_scalar<const N: usize>(
         travel += (0..N)
             .map(|dof| (point[dof] - plays.command[dof]).abs())
             .sum::<f64>();
-        plays = transmission.advance(&plays, point);
+        transmission.advance(&mut plays, point);
         let outputs = outputs(&plays);
         for (dof, index, play, state) in &mut states {
             prop_assert_eq!(play.step(state, point[*dof]), outputs[*dof][*index]);
@@ -124,13 +124,13 @@ fn check_vector<const N: usize>(
 ) -> Result<(), TestCaseError> {
     let mut plays = Plays::REST;
     for command in commands(points, TICK) {
-        plays = transmission.advance(&plays, &command);
+        transmission.advance(&mut plays, &command);
         let full = fullest(transmission, &plays);
         prop_assert!(full <= 1.0 + 1e-6, "{full} at {command:?}");
     }
     let mut rested = plays;
     for _ in 0..20 {
-        rested = transmission.advance(&rested, &plays.command);
+        transmission.advance(&mut rested, &plays.command);
     }
     prop_assert_eq!(rested.travel, plays.travel);
     for (rested, before) in outputs(&rested).iter().zip(&outputs(&plays)) {
@@ -156,7 +156,7 @@ fn check_one_moves<const N: usize>(
     for [to] in commands(points, TICK) {
         let mut command = [0.0; N];
         command[dof] = to;
-        plays = transmission.advance(&plays, &command);
+        transmission.advance(&mut plays, &command);
         let outputs = outputs(&plays);
         for ((play, output), found) in states.iter_mut().zip(&outputs[dof]) {
             let mut state = PlayState { output: *output };
@@ -226,15 +226,15 @@ proptest! {
         let transmission = transmission([0, 0, 0], lever, unit);
         let mut plays = Plays::REST;
         for command in commands(&before, TICK) {
-            plays = transmission.advance(&plays, &command);
+            transmission.advance(&mut plays, &command);
         }
         let to = |share: f64| {
             core::array::from_fn(|dof| plays.command[dof] + share * size * motion[dof])
         };
-        let whole = transmission.advance(&plays, &to(1.0));
-        let mut divided = plays;
+        let (mut whole, mut divided) = (plays, plays);
+        transmission.advance(&mut whole, &to(1.0));
         for part in 1..=32 {
-            divided = transmission.advance(&divided, &to(f64::from(part) / 32.0));
+            transmission.advance(&mut divided, &to(f64::from(part) / 32.0));
         }
         let radii = all_radii(&transmission);
         let narrowest = radii.iter().flat_map(|radii| &radii[..SHARED]);
@@ -255,7 +255,7 @@ proptest! {
         let (mut plays, mut exact) = (Plays::REST, [[0.0; 2]; SHARED]);
         for command in commands(&points, step) {
             let motion = [0, 1].map(|dof| command[dof] - plays.command[dof]);
-            plays = transmission.advance(&plays, &command);
+            transmission.advance(&mut plays, &command);
             let outputs = outputs(&plays);
             for (index, exact) in exact.iter_mut().enumerate() {
                 let half = [radii[0][index], radii[1][index]];
