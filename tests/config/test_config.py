@@ -187,7 +187,7 @@ def test_numbers_with_signs_and_those_of_motors_have_ranges(
         config.replace(**{key: value})
 
 
-@pytest.mark.parametrize(("matrix", "most"), [((), 24.0), (((0.5, 0.5), (0.5, -0.5)), 24.0)])
+@pytest.mark.parametrize(("matrix", "most"), [((), 8.0), (((0.5, 0.5), (0.5, -0.5)), 8.0)])
 def test_the_travel_of_a_motor_is_of_the_order_of_its_commands(
     matrix: tuple[tuple[float, float], ...], most: float
 ) -> None:

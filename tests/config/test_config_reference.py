@@ -93,7 +93,7 @@ def test_uncommented_drives_need_only_what_is_required() -> None:
     start = lines.index("# [drives]")
     end = lines.index("# [[dof]]")
     text = "\n".join(line.removeprefix("# ") for line in lines[start:end])
-    values = {"node": "", "travel": "[0, 1]", "counts_per_unit": "1e4"}
+    values = {"node": "", "travel": "[0, 2]", "counts_per_unit": "1e4"}
     nodes = iter(range(1, 4))
     text = re.sub(
         r"^(\w+) = \.\.\.  # required$",

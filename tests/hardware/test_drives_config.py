@@ -38,7 +38,7 @@ def rotation(**changes: Any) -> dict[str, Any]:
         (rotation(speed_limit=-1.0), "drives.rotation.speed_limit", "above 0"),
         (rotation(following_window=0.31), "drives.rotation.following_window", "at most"),
         (rotation(following_window=0.0), "drives.rotation.following_window", "above 0"),
-        (rotation(following_error=6.6), "drives.rotation.following_error", "the width of travel"),
+        (rotation(following_error=3.3), "drives.rotation.following_error", "half of the width"),
         (rotation(unit="mm"), "drives.rotation.unit", "no such key"),
         ({"rotation": {"node": 2}}, "drives.rotation.counts_per_unit", "no default"),
         ({"cycle": 0.0105}, "drives.cycle", "whole milliseconds"),

@@ -112,7 +112,7 @@ def test_a_motor_by_its_name_ends_the_run(tmp_path: Path) -> None:
 def test_a_limit_of_the_microcontroller_is_named_with_the_motor_of_a_robot(tmp_path: Path) -> None:
     document = robot_document("serial", tmp_path, 2)
     right = from_document(document)
-    far = {"counts_per_unit": 8e7, "travel": [-25.0, 0.0], "speed_limit": 1e-4}
+    far = {"counts_per_unit": 2.2e8, "travel": [-9.0, 0.0], "speed_limit": 4e-5}
     document["drives"]["motors"]["joint_2"] |= far
     assert right.drives is not None
     with ExitStack() as stack:

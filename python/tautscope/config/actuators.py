@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from tautscope.config.axes import DofEntry, Name
 from tautscope.config.drives import DrivesConfig
-from tautscope.config.fields import LIMITS, MOST_RATIO
+from tautscope.config.fields import LIMITS
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, require
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
+
+_MOST_REACHES = 10.0
+"""Largest travel of a motor over the farthest that commands move it: less than degrees in a rad."""
 
 
 class ActuatorsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -93,7 +96,7 @@ def check_motors(
 
 def _check_travel(key: str, travel: tuple[float, float], reach: float) -> None:
     """Check that a motor's travel is of the order of the farthest that commands move it."""
-    most = MOST_RATIO * reach
+    most = _MOST_REACHES * reach
     allowed = f"within -{most:.3g} to {most:.3g}: commands move it by {reach:.3g}"
     require(max(map(abs, travel)) <= most, f"{key}.travel", travel, allowed)
 

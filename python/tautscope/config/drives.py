@@ -80,7 +80,7 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Largest speed [m/s or rad/s]; set and checked alike."""
     following_error: Positive
     """Largest distance of the motor from all commands of the last `lag` [m or rad]; by default 1 %
-    of the width of `travel`, of a servo 64 counts; at most that width."""
+    of the width of `travel`, of a servo 64 counts; at most half of that width."""
     following_window: Positive
     """Largest distance that may last longer than `following_timeout` [m or rad]; by default half of
     `following_error`."""
@@ -208,10 +208,10 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{axis.travel}",
             )
             require(
-                axis.following_error <= axis.travel[1] - axis.travel[0],
+                2.0 * axis.following_error <= axis.travel[1] - axis.travel[0],
                 f"{path}.following_error",
                 axis.following_error,
-                f"at most the width of travel = {axis.travel}",
+                f"at most half of the width of travel = {axis.travel}",
             )
             require_at_most(path, axis, "following_window", "following_error")
             if self.protocol in PORTS:
