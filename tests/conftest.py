@@ -31,7 +31,7 @@ def pytest_configure() -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One more than processors: a fifth of the time tests wait for processes, buses and browsers."""
+    """One more than processors: tests wait a fifth of the time, for processes and browsers."""
     return (os.cpu_count() or 1) + 1
 
 
