@@ -30,6 +30,7 @@ def pytest_configure() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """One more than processors: tests wait a fifth of the time, for processes and browsers."""
     return (os.cpu_count() or 1) + 1

@@ -181,7 +181,7 @@ def test_fault_persists_until_it_is_reset(tmp_path: Path) -> None:
     [
         ({"node": 4}, SettingRefusedError, "has 3 axes. Correct drives.rotation.node"),
         (
-            {"counts_per_unit": 1e7, "travel": [-200.0, 0.0], "speed_limit": 1e-3},
+            {"counts_per_unit": 1.7e7, "travel": [-120.0, 0.0], "speed_limit": 1e-3},
             SettingRefusedError,
             "takes -1073741824 to 1073741824",
         ),
