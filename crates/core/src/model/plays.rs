@@ -186,6 +186,7 @@ impl<const N: usize> Transmission<N> {
     }
 
     /// Moves the plays by a straight motion of the command to `to` (N,), in units.
+    #[inline]
     pub fn advance(&self, plays: &mut Plays<N>, to: &[f64; N]) {
         let dofs = plays.outputs.iter_mut().zip(&self.dofs).zip(to);
         let mut are_alone = true;
@@ -293,6 +294,7 @@ impl Radii {
 
     /// Sum of radius times coefficient while the tip slides steadily along `direction`, which is of length 1 in the motion of
     /// the surface of its group, or 0: command less tip over the gain, but for offset and bends.
+    #[inline]
     pub fn deflection(&self, row: &Row, direction: f64) -> f64 {
         let (shared, own) = row.split_at(SHARED);
         product(shared, &self.shared) * direction + product(own, &OWN_RADII) * sign(direction)
@@ -327,6 +329,7 @@ fn between(value: f64, least: f64, most: f64) -> f64 {
 }
 
 /// Contribution of the bent plays of a DOF whose own plays slide along `direction` to a command `to`.
+#[inline]
 pub fn bent(row: &Row, to: f64, direction: f64) -> f64 {
     let side = sign(direction);
     let mut above = [0.0; BENT];
