@@ -235,12 +235,18 @@ def test_drives_in_the_background_serve_a_master_until_a_signal(
     assert not socket.exists()
 
 
+def bench_file(folder: Path) -> tuple[Path, Path, Path]:
+    """A bench's configuration file and its two sockets."""
+    file, can, video = folder / "rig.toml", folder / "can", folder / "video"
+    changes = {"drives.channel": str(can), "camera.source.url": f"unix:{video}"}
+    file.write_text(dump_config(load_config("bench").replace(**changes)), encoding="utf-8")
+    return file, can, video
+
+
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
 def test_bench_in_the_background_ends_with_a_signal(tmp_path: Path, ending: signal.Signals) -> None:
     """`tautscope bench &`: it goes on without input, and leaves no socket behind."""
-    can, video, file = tmp_path / "can", tmp_path / "video", tmp_path / "rig.toml"
-    changes = {"drives.channel": str(can), "camera.source.url": f"unix:{video}"}
-    file.write_text(dump_config(load_config("bench").replace(**changes)), encoding="utf-8")
+    file, can, video = bench_file(tmp_path)
     with background("null device", "-m", "tautscope", "bench", "--config", str(file)) as (
         shell,
         job,
@@ -251,5 +257,37 @@ def test_bench_in_the_background_ends_with_a_signal(tmp_path: Path, ending: sign
         assert video.exists()
         os.kill(job, ending)
     assert shell.returncode == (128 + ending if ending is signal.SIGTERM else 0)
+    assert not can.exists()
+    assert not video.exists()
+
+
+def test_a_full_disk_ends_the_bench(tmp_path: Path) -> None:
+    file, can, video = bench_file(tmp_path)
+    command = ("-m", "tautscope", "bench", "--config", str(file), "--truth", "/dev/full")
+    with process(*command) as (bench, _):
+        assert bench.wait(TIMEOUT) == 2
+        assert bench.stderr is not None
+        assert bench.stderr.read() == (
+            "error: --truth: got '/dev/full', expected a file that can be written "
+            "([Errno 28] No space left on device)\n"
+        )
+    assert not can.exists()
+    assert not video.exists()
+
+
+def test_the_bench_ends_when_nobody_reads_its_events(tmp_path: Path) -> None:
+    file, can, video = bench_file(tmp_path)
+    command = [sys.executable, "-m", "tautscope", "bench", "--config", str(file)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as bench:
+        assert bench.stdin is not None
+        assert bench.stdout is not None
+        assert bench.stderr is not None
+        assert json.loads(bench.stdout.readline())["what"] == "ready"
+        bench.stdout.close()
+        bench.stdin.write("freeze rotation\n")
+        bench.stdin.flush()
+        assert bench.wait(TIMEOUT) == 141
+        assert not bench.stderr.read()
     assert not can.exists()
     assert not video.exists()

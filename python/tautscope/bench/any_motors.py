@@ -20,7 +20,7 @@ from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import EventPrinter
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.bench.motors import OnCycle, SimulatedMotors
-from tautscope.bench.requests import serve_requests
+from tautscope.bench.requests import raise_errors_of_threads, serve_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
 from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
@@ -78,6 +78,7 @@ def main() -> None:
     start = np.array(arguments.start or [0.0] * len(config.all_motors))
     with (
         exit_on_signals(),
+        raise_errors_of_threads(),
         ExitStack() as resources,
         make_motors(config, resources, start=start, modes=tuple(arguments.modes)) as motors,
     ):

@@ -31,11 +31,11 @@ class GroundTruthWriter:
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path
         try:
             self._file = path.open("w", encoding="utf-8")
         except OSError as error:
-            allowed = f"a file that can be written ({error})"
-            raise OutputError("--truth", str(path), allowed) from None
+            raise self._refused(error) from None
         self._lines = deque([",".join(TRUTH.names or ())])
         self._writing = Repeater(self._write, _WRITE_PERIOD)
 
@@ -51,9 +51,15 @@ class GroundTruthWriter:
         self._file.close()
 
     def _write(self) -> None:
-        while self._lines:
-            self._file.write(self._lines.popleft() + "\n")
-        self._file.flush()
+        try:
+            while self._lines:
+                self._file.write(self._lines.popleft() + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise self._refused(error) from None
+
+    def _refused(self, error: OSError) -> OutputError:
+        return OutputError("--truth", str(self._path), f"a file that can be written ({error})")
 
 
 def read_ground_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -26,7 +26,7 @@ client (on CAN per SYNC, after the TxPDOs are sent), and by the clock where none
 class SimulatedMotors(ABC):
     """Motors on one bus, in a thread; a context manager.
 
-    Leaving it switches their power off and raises the error that ended the thread, if any.
+    Leaving it switches their power off.
 
     Args:
         config: The true rig, which may differ from the master's configuration.
@@ -53,7 +53,6 @@ class SimulatedMotors(ABC):
         self._faults: dict[Motor, dict[str, float]] = {dof: {} for dof in config.all_motors}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
-        self._failure: BaseException | None = None
 
     def inject(self, kind: str, dof: Motor, delay: float = 0.3) -> None:
         """Inject a fault; `delay` [s] applies to the kind ``delay``.
@@ -103,16 +102,11 @@ class SimulatedMotors(ABC):
     def __exit__(self, *failure: object) -> None:
         self._stopping.set()
         self._thread.join()
-        if self._failure is not None:
-            raise self._failure
 
     def _run(self) -> None:
-        try:
-            self._begin()
-            while not self._stopping.is_set():
-                self._process_next()
-        except BaseException as error:
-            self._failure = error
+        self._begin()
+        while not self._stopping.is_set():
+            self._process_next()
 
     @abstractmethod
     def _begin(self) -> None:

@@ -1,15 +1,34 @@
-"""Requests to the bench, one per line of its standard input."""
+"""What the process of a bench waits for: requests on its standard input, and errors of threads."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tautscope.errors import ConfigError
+
+
+@contextmanager
+def raise_errors_of_threads() -> Iterator[None]:
+    """Raise the first error that ends a thread, in the main thread, which it interrupts."""
+    errors: list[BaseException] = []
+
+    def interrupt(thread: threading.ExceptHookArgs) -> None:
+        errors.append(thread.exc_value or thread.exc_type())
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    hook, threading.excepthook = threading.excepthook, interrupt
+    try:
+        yield
+    finally:
+        threading.excepthook = hook
+        if errors:
+            raise errors[0]
 
 
 def serve_requests(inject: Callable[[str], None]) -> None:

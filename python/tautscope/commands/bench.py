@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.bench.events import EventPrinter
-from tautscope.bench.requests import serve_requests
+from tautscope.bench.requests import raise_errors_of_threads, serve_requests
 from tautscope.commands import arguments
 from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Dof
@@ -97,6 +97,7 @@ def _bench(options: argparse.Namespace) -> None:
         config = draw_rig(config, options.drawn)
     with (
         exit_on_signals(),
+        raise_errors_of_threads(),
         short_switch_interval(),
         realtime_process(SETPOINTS) as refusal,
         Bench(config, options.truth, modes=tuple(options.modes)) as bench,

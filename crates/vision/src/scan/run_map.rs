@@ -3,8 +3,8 @@
 use super::format::MAX_SIDE;
 use crate::math::{floor, real};
 
-/// Capacity; further runs are dropped. A frame with two bands has some hundred, more than 2^16 are noise.
-const MAX_RUNS: usize = 1 << 16;
+/// Capacity from the start. A frame with two bands has some hundred runs, one of noise more than these.
+const USUAL_RUNS: usize = 1 << 16;
 
 /// The runs of a frame by row.
 #[derive(Clone, Debug, Default)]
@@ -16,22 +16,20 @@ pub struct RunMap {
 }
 
 impl RunMap {
-    /// Clears the map for a new frame; allocates only when the frame is higher than those before.
+    /// Clears the map for a new frame. Memory grows only with frames that are higher or noisier than those before.
     pub fn start(&mut self, width: usize, height: usize) {
         self.width = width;
         self.ends.clear();
         self.ends.reserve(height);
         self.runs.clear();
-        self.runs.reserve(MAX_RUNS);
+        self.runs.reserve(USUAL_RUNS);
     }
 
     /// Adds a run to row `v`, below or to the right of those before.
     pub fn add(&mut self, v: usize, start: usize, end: usize) {
         debug_assert!(start < end && end <= MAX_SIDE);
         self.end_rows(v);
-        if let (Ok(start), Ok(end)) = (u32::try_from(start), u32::try_from(end))
-            && self.runs.len() < MAX_RUNS
-        {
+        if let (Ok(start), Ok(end)) = (u32::try_from(start), u32::try_from(end)) {
             self.runs.push((start, end));
         }
     }
@@ -89,3 +87,7 @@ fn pixel(coordinate: f64) -> Option<usize> {
         .contains(&coordinate)
         .then(|| floor(coordinate + 0.5))
 }
+
+#[cfg(test)]
+#[path = "../../tests/units/run_map.rs"]
+mod tests;
