@@ -9,6 +9,7 @@ from matplotlib.text import Annotation
 from records.simulated import simulate
 from tautscope.analysis.compensation import as_played, plant, run
 from tautscope.analysis.compensator import compensator
+from tautscope.analysis.models.constant_play import operator
 from tautscope.analysis.slide import slide
 from tautscope.analysis.verdict import judge
 from tautscope.errors import RecordError
@@ -58,6 +59,43 @@ def test_the_figure_marks_the_width_only_where_it_is_identified() -> None:
     assert [line.get_label() for line in time.lines] == ["measured", "predicted"]
     for kind in ("linear", "random walk"):
         assert not slide(judged(kind, 1)).axes[0].texts
+
+
+def repeated(times: int, every: int = 1) -> Record:
+    """A play of 4 with 20 strokes in 100 s, again and again; the tip is seen every so often."""
+    samples = np.arange(times * 5_000)
+    command = 10 * np.sin(2 * np.pi * samples / 500)
+    measured = operator(command, 2.0, 0.0) + np.random.default_rng(0).normal(0, 0.05, len(samples))
+    measured[samples % every != 0] = np.nan
+    return Record(command, measured, 0.02 * samples, samples, Cleaning())
+
+
+def test_what_the_loop_would_do_does_not_depend_on_the_length_of_the_record() -> None:
+    """A motion that is played faster than it is would be a harder one."""
+    found = [judge(repeated(times)).compensation for times in (1, 10)]
+    short, long = (each.after / each.before for each in found if each is not None)
+    assert long == pytest.approx(short, rel=0.2)
+
+
+def test_the_loop_is_simulated_on_the_fastest_strokes_of_a_long_record() -> None:
+    """At their own speed, also where the record rests for an hour."""
+    moving, pause = repeated(4), 3_600.0
+    after = moving.clock > 100
+    record = replace(moving, time=moving.clock + np.where(after, pause, 0.0))
+    found = judge(record).found
+    part, late = as_played(record, found)
+    assert part.clock[-1] == pytest.approx(100, abs=1)
+    assert np.diff(part.clock).max() == pytest.approx(0.02)
+    assert late.delay == found.delay
+    part, _ = as_played(replace(record, time=4 * record.clock), found)
+    assert part.clock[-1] == pytest.approx(100, abs=1)
+    assert len(part.command) == pytest.approx(5_000, rel=0.02)
+
+
+def test_a_long_record_with_few_tips_is_simulated_whole() -> None:
+    record = repeated(10, every=12_000)
+    found = judge(repeated(2)).found
+    assert len(as_played(record, found)[0].command) == len(record.command)
 
 
 @pytest.mark.parametrize(("unit", "size"), [("", 1e4), ("m", 1e3), ("rad", 1e3), ("px", 1e-4)])

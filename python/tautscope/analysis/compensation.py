@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tautscope.analysis.compensator import compensator, scale_of
+from tautscope.analysis.delayed_play import turns
 from tautscope.analysis.identification import Identification, Interval
 from tautscope.analysis.models import prandtl_ishlinskii
 from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
@@ -19,7 +20,9 @@ from tautscope.report.metrics import rms
 from tautscope.runs.records import Record
 
 LONGEST = 100.0
-"""Simulated time [s]; a longer record is played faster."""
+"""Simulated time [s]."""
+STROKES = 20
+"""Strokes of a longer record that are simulated, at their own speed where `LONGEST` is enough."""
 UNTIMED = 0.02
 """Interval of samples without a time [s]."""
 LONGEST_INTERVAL = 0.1
@@ -64,8 +67,8 @@ class Compensation:
 
 def simulate(record: Record, found: Identification) -> Compensation:
     """Run the `compensator` of a record on the plays of the same record."""
-    played, late = as_played(record, found)
-    return run(compensator({"tip": (played, late)}), played, *plant(record, found))
+    played = as_played(record, found)
+    return run(compensator({"tip": played}), played[0], *plant(record, found))
 
 
 def plant(record: Record, found: Identification) -> tuple[PrandtlIshlinskii, float]:
@@ -87,12 +90,39 @@ def plant(record: Record, found: Identification) -> tuple[PrandtlIshlinskii, flo
 
 
 def as_played(record: Record, found: Identification) -> tuple[Record, Identification]:
-    """A record with a time from 0 to at most `LONGEST`, and its delay in this time."""
-    clock = 1.0 if record.is_timed else UNTIMED
-    clock *= min(1.0, LONGEST / (clock * float(record.clock[-1] - record.clock[0])))
-    delay = Interval(*(clock * each for each in vars(found.delay).values()))
-    time = clock * (record.clock - record.clock[0])
-    return replace(record, time=time), replace(found, delay=delay)
+    """A record with a time from 0 to at most `LONGEST`, and its delay in this time.
+
+    Of a longer record it is the part whose strokes are the fastest. A loop does worse on a motion
+    that is played faster than it is.
+    """
+    clock = record.clock * (1.0 if record.is_timed else UNTIMED)
+    kept = _fastest_part(record, found, clock)
+    speed = max(1.0, float(np.ptp(clock[kept])) / LONGEST)
+    time = (clock[kept] - clock[kept][0]) / speed
+    scale = (1.0 if record.is_timed else UNTIMED) / speed
+    delay = Interval(*(scale * each for each in vars(found.delay).values()))
+    part = replace(
+        record,
+        command=record.command[kept],
+        measured=record.measured[kept],
+        time=time,
+        rows=record.rows[kept],
+    )
+    return part, replace(found, delay=delay)
+
+
+def _fastest_part(record: Record, found: Identification, clock: Floats) -> slice:
+    """`LONGEST` of a clock [s], or `STROKES` strokes if they take longer: the fastest ones."""
+    at = clock[turns(record.command, found.width.value / abs(found.gain))]
+    if clock[-1] - clock[0] <= LONGEST or len(at) <= STROKES:
+        return slice(None)
+    first = int(np.argmin(at[STROKES:] - at[:-STROKES]))
+    start = at[first]
+    end = max(at[first + STROKES], min(start + LONGEST, clock[-1]))
+    start = max(min(start, end - LONGEST), clock[0])
+    part = slice(*np.searchsorted(clock, [start, end]).tolist())
+    has_tips = np.count_nonzero(np.isfinite(record.measured[part])) > 1
+    return part if has_tips else slice(None)
 
 
 def run(

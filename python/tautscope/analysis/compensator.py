@@ -13,9 +13,11 @@ from tautscope.analysis.identification import Identification
 from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
-MARGIN, REACH, HASTE = 1.5, 1.0, 2.0
-"""Width that is compensated over the one found; travel beyond that of the record, in widths; and
-speed that is followed over that of the record."""
+MARGIN, HASTE = 1.5, 2.0
+"""Width that is compensated, and travel beyond that of the record, over the width found; and speed
+that is followed over that of the record."""
+CHANGE_RATE = 0.1
+"""Of the law: its default is for images, of which some are wrong; a record has a sensor."""
 UNNAMED = 1e-3
 """Metres per unit of a tip whose unit the file does not name, or a thousandth of it, and so on."""
 _LARGEST = {"m": 1.0, "rad": 100.0, "": 0.1}
@@ -78,8 +80,9 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         scale = scale_of(record)
         width = scale * found.width.value
         path = scale * (found.gain * record.command + found.offset)
-        low, high = float(path.min()) - REACH * width, float(path.max()) + REACH * width
-        limit = max(MARGIN * width, (high - low) / MOST_RANGE)
+        limit = MARGIN * width
+        low, high = float(path.min()) - limit, float(path.max()) + limit
+        limit = max(limit, (high - low) / MOST_RANGE)
         dof = {
             "name": name,
             "unit": "rad" if record.units[1] in ANGLES else "m",
@@ -99,6 +102,7 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         units.append(record.units[0])
     document: dict[str, Any] = {
         "dof": dofs,
+        "law": {"change_rate": CHANGE_RATE},
         "measurement": {"tip_deviation": max(1e-3, *noises)},
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
@@ -112,7 +116,8 @@ def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
     """What a person has to check in a `compensator`."""
     found = [
         "[[dof]] is in m or rad, with the tip's zero; [actuators] has the motors of the record.",
-        "range: motion of the record and one slack more to both sides. May your motors go there?",
+        f"range: motion of the record and {MARGIN:g} slacks more to both sides. May motors go there?",
+        "law.change_rate: of a sensor that is never wrong; 0.01 where it may be, as images.",
     ]
     for name, (record, _) in parts.items():
         unit, scale = record.units[1], scale_of(record)

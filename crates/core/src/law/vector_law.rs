@@ -43,13 +43,14 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period,
-///           |dc| - |du| grows by at most ACCELERATION period^2 in a tick, from 0 when w reverses
+///           |dc| - |du| <= n (s + n ACCELERATION period^2),   s <- (|dc| - |du|) / n, 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
 /// ```
 ///
-/// with Birge's ratio of the last images: images that do not fit change little.
+/// with the ticks n since the reference moved last, 1 after a rest of more than `input_age`: an input device may be slower
+/// than the loop. Birge's ratio is that of the last images: images that do not fit change little.
 /// The steady command alone leaves the tip off the reference, because direction and plays keep turning. One DOF alone:
 /// 0 <= dc / du <= `K_b`, Eq. (2). Where all DOFs of a group rest, no command moves, but each moves where another does: while
 /// rotation turns, the friction that held the insertion is released.
@@ -66,8 +67,12 @@ pub struct VectorLaw<const N: usize> {
     step_limit: [f64; N],
     /// Most by which |dc| - |du| grows in a tick.
     growth: f64,
-    /// |dc| - |du| of each DOF's group in the last tick, 0 or above.
+    /// |dc| - |du| of each DOF's group per tick when it moved last, 0 or above.
     surplus: [f64; N],
+    /// Ticks since each DOF's group moved last.
+    rested: [f64; N],
+    /// Most of these in which a slow input device still moves, 1 or above.
+    most_rested: f64,
     limits: [PlayLimit; N],
     direction: Direction<N>,
     reference: Option<[f64; N]>,
@@ -101,6 +106,8 @@ pub struct Bounds<const N: usize> {
     pub speed: [f64; N],
     /// Control period [s].
     pub period: f64,
+    /// Longest time between two values of a moving input device [s].
+    pub input_age: f64,
     /// Limits of the contact offsets.
     pub offsets: [PlayLimit; N],
 }
@@ -131,6 +138,8 @@ impl<const N: usize> VectorLaw<N> {
                 .map(|speed| speed * bounds.period * BELOW_LIMIT),
             growth: ACCELERATION * bounds.period * bounds.period,
             surplus: [0.0; N],
+            rested: [0.0; N],
+            most_rested: bounds.input_age / bounds.period,
             limits: bounds.offsets,
             direction: Direction::new(friction, transmission.unit(), settings.direction_travel),
             transmission,
@@ -167,6 +176,7 @@ impl<const N: usize> VectorLaw<N> {
             return reference;
         };
         let motion = subtract(reference, last);
+        self.rested = self.rested.map(|ticks| ticks + 1.0);
         if motion.iter().all(|motion| *motion == 0.0) {
             return self.command;
         }
@@ -191,21 +201,24 @@ impl<const N: usize> VectorLaw<N> {
             },
         );
         let length = self.norm(moved);
-        let step = self.bounded_step(relative, moved, length);
+        let ticks = self.input_ticks();
+        let step = self.bounded_step(relative, moved, length, ticks);
         let taken = zip_with(self.norm(step), length, |step, own| (step - own).max(0.0));
         let (mut command, gain) = (self.command, self.settings.free_gain);
         // Without gain there is no compensation.
         let share = if gain > 1.0 { self.share } else { 0.0 };
-        let dofs = command.iter_mut().zip(&mut self.surplus);
+        let states = self.surplus.iter_mut().zip(&mut self.rested).zip(ticks);
+        let dofs = command.iter_mut().zip(states);
         let dofs = dofs.zip(taken).zip(length).zip(self.transmission.dofs());
         let parts = reference.into_iter().zip(self.lead).zip(motion).zip(step);
-        for (((((command, surplus), taken), length), dof), parts) in dofs.zip(parts) {
+        for (((((command, state), taken), length), dof), parts) in dofs.zip(parts) {
             if length < REST {
                 continue;
             }
             let (((reference, lead), motion), step) = parts;
             let before = *command;
-            *surplus = taken;
+            let ((surplus, rested), ticks) = state;
+            (*surplus, *rested) = (taken / ticks, 0.0);
             *command = reference + lead + share * (step * dof.unit - motion);
             if dof.is_alone {
                 // Eq. (2), to the last bit.
@@ -328,9 +341,26 @@ impl<const N: usize> VectorLaw<N> {
         self.dot(motion, motion).map(libm::sqrt)
     }
 
+    /// For each DOF's group the ticks (N,) in which its reference has come to its next value: of a slow device several.
+    fn input_ticks(&self) -> [f64; N] {
+        self.rested.map(|ticks| {
+            if ticks <= self.most_rested {
+                ticks
+            } else {
+                1.0
+            }
+        })
+    }
+
     /// The motion of the commands towards the target, within the bounds of each group, for a reference and its motion (N,), all
-    /// in units; `moved` (N,) are the lengths of the motion. A group that rests does not move.
-    fn bounded_step(&self, reference: [f64; N], motion: [f64; N], moved: [f64; N]) -> [f64; N] {
+    /// in units; `moved` (N,) are the lengths of the motion, `ticks` the time that it took. A group that rests does not move.
+    fn bounded_step(
+        &self,
+        reference: [f64; N],
+        motion: [f64; N],
+        moved: [f64; N],
+        ticks: [f64; N],
+    ) -> [f64; N] {
         let mut step = subtract(self.target, self.plays.command);
         let against = self.dot(step, motion);
         let dofs = step.iter_mut().zip(motion).zip(moved).zip(against);
@@ -352,9 +382,12 @@ impl<const N: usize> VectorLaw<N> {
             .transmission
             .friction()
             .over_group(share, 1.0, f64::min);
-        let bounds = share.iter_mut().zip(self.surplus).zip(moved).zip(length);
+        let surplus = zip_with(self.surplus, ticks, |surplus, ticks| {
+            ticks * (ticks * self.growth + surplus)
+        });
+        let bounds = share.iter_mut().zip(surplus).zip(moved).zip(length);
         for (((share, surplus), moved), length) in bounds {
-            let fastest = (self.settings.free_gain * moved).min(moved + (self.growth + surplus));
+            let fastest = (self.settings.free_gain * moved).min(moved + surplus);
             *share = share.min(fastest / length);
         }
         let now = self.plays.tip(&self.rows);

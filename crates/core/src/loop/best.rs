@@ -232,6 +232,7 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
             width_limit: settings.safety.width_limit,
             speed: settings.safety.command_speed,
             period: settings.control.period,
+            input_age: settings.safety.reference_age,
             offsets: limits,
         };
         Ok(Self {

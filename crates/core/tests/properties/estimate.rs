@@ -262,6 +262,7 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
         width_limit: [2.0 * UNIT],
         speed: [40.0 * UNIT],
         period: 0.005,
+        input_age: 0.05,
         offsets: [PlayLimit::new(3.0 * UNIT, 2.0 * UNIT).unwrap()],
     };
     let own = settings(&safety()).law;

@@ -23,8 +23,9 @@ struct Checked<const N: usize> {
     reference: [f64; N],
     share: f64,
     rows: [Row; N],
-    /// |dc| - |du| of each group in the last tick, 0 or above.
+    /// |dc| - |du| of each group per tick when it moved last, 0 or above, and the ticks since.
     surplus: [f64; N],
+    rested: [f64; N],
     /// Largest speed of the predicted tip over its bound.
     fastest: f64,
     /// Ticks in which a command moved otherwise than the reference.
@@ -67,6 +68,7 @@ impl<const N: usize> Checked<N> {
             width_limit: unit.map(|unit| unit * random.within(1.0, 3.0)),
             speed: unit.map(|unit| unit * random.within(0.05, 0.2) / PERIOD),
             period: PERIOD,
+            input_age: 0.05,
             offsets: unit.map(|unit| PlayLimit::new(2.0 * unit, 1.5 * unit).unwrap()),
         };
         let mut checked = Self {
@@ -78,6 +80,7 @@ impl<const N: usize> Checked<N> {
             share: 1.0,
             rows: [[0.0; COEFFICIENTS]; N],
             surplus: [0.0; N],
+            rested: [0.0; N],
             fastest: 0.0,
             compensated: 0,
         };
@@ -152,6 +155,8 @@ impl<const N: usize> Checked<N> {
     }
 
     fn check_group(&mut self, group: usize, last: [f64; N], before: [f64; N], after: [f64; N]) {
+        self.rested[group] += 1.0;
+        let rested = self.rested[group];
         let members = self.transmission.friction().members(group);
         let own = || (0..N).filter(|dof| members[*dof]);
         let minus = |a: [f64; N], b: [f64; N]| core::array::from_fn(|dof| a[dof] - b[dof]);
@@ -171,9 +176,11 @@ impl<const N: usize> Checked<N> {
             norm(dc) <= gain * norm(du) * (1.0 + 1e-12) + rounding,
             "{facts}"
         );
+        let is_moving = rested * PERIOD <= self.bounds.input_age;
+        let ticks = if is_moving { rested } else { 1.0 };
         let surplus = norm(dc) - norm(du);
         if self.share >= 1.0 {
-            let most = self.surplus[group] + ACCELERATION * PERIOD * PERIOD;
+            let most = ticks * (self.surplus[group] + ticks * ACCELERATION * PERIOD * PERIOD);
             assert!(surplus <= most + rounding, "{facts}: {surplus} {most}");
         }
         let product = self.dot(members, dc, du);
@@ -188,8 +195,9 @@ impl<const N: usize> Checked<N> {
                 assert!(within.contains(&after[dof]), "{facts}");
             }
         }
+        self.rested[group] = 0.0;
         self.surplus[group] = if self.share >= 1.0 {
-            surplus.max(0.0)
+            surplus.max(0.0) / ticks
         } else {
             f64::INFINITY
         };
@@ -325,6 +333,7 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
         width_limit: [10.0],
         speed: [f64::MAX],
         period: PERIOD,
+        input_age: 0.05,
         offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
     };
     let mut law = VectorLaw::new(own, transmission, &bounds).unwrap();
@@ -361,6 +370,58 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
         let least = 0.5 / (rate * travel);
         assert!(f64::from(ticks) >= least, "{ticks} {least}");
     }
+}
+
+/// A device that gives each n-th value of a motion: after a reversal the command gains as much in the same time, and at most as
+/// much as the bound of its speed allows; after a longer rest than `input_age` as little as in one tick.
+#[test]
+fn the_slack_is_crossed_as_fast_with_an_input_device_slower_than_the_loop() {
+    let transmission = Transmission::new(Friction::independent(), [1.0]).unwrap();
+    let bounds = Bounds {
+        width_limit: [1.0],
+        speed: [f64::MAX],
+        period: PERIOD,
+        input_age: 0.05,
+        offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
+    };
+    let mut rows = [[0.0; COEFFICIENTS]; 1];
+    // The largest own play, a slack of 2.5: none of these motions crosses it.
+    rows[0][SHARED + OWN - 1] = 1.0;
+    let growth = ACCELERATION * PERIOD * PERIOD;
+    let law = LawSettings {
+        free_gain: 20.0,
+        ..settings(&safety()).law
+    };
+    // Motion beyond that of the reference, within 40 ticks after a reversal.
+    let gained = |every: usize| {
+        let mut law = VectorLaw::new(law, transmission, &bounds).unwrap();
+        let (mut reference, mut lead) = (0.0, 0.0);
+        for tick in 0..1_040_usize {
+            if tick % every == 0 {
+                let motion = 0.01 * f64::from(u32::try_from(every).unwrap());
+                reference += if tick < 1_000 { motion } else { -motion };
+            }
+            let command = law.propose([reference], &rows, 1.0);
+            law.commit(command);
+            if tick < 1_000 {
+                lead = command[0] - reference;
+            }
+        }
+        lead - (law.command[0] - reference)
+    };
+    let fast = gained(1);
+    assert!(
+        (fast / (growth * 40.0 * 41.0 / 2.0) - 1.0).abs() < 0.1,
+        "{fast}"
+    );
+    for (every, n) in [(2, 2.0), (4, 4.0), (10, 10.0)] {
+        let (slow, values) = (gained(every), 40.0 / n);
+        let most = n * n * growth * values * (values + 1.0) / 2.0;
+        assert!(slow < most * 1.001, "{every}: {slow} {most}");
+        assert!(slow > 0.9 * fast, "{every}: {slow} {fast}");
+    }
+    let rested = gained(20);
+    assert!(rested < 4.0 * growth, "{rested}");
 }
 
 /// One DOF: 1 - travel / length after a reversal, -1 at most; two of one friction: of length 1 in a steady motion.

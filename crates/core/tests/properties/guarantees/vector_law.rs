@@ -37,6 +37,7 @@ impl CheckedLaw {
             width_limit,
             speed: settings.safety.command_speed,
             period: PERIOD,
+            input_age: settings.safety.reference_age,
             offsets: [0, 1, 2].map(|dof| {
                 PlayLimit::new(width_limit[dof], settings.safety.offset_limit[dof]).unwrap()
             }),
