@@ -66,7 +66,7 @@ def test_several_degrees_of_freedom_get_a_verdict_each_and_one_loop(
     motors = Actuators(config).motors([-26e-3, 0.4])
     np.testing.assert_allclose(motors, [103, 0.4], atol=0.03)
     low, high = config.dof[0].travel
-    assert high - low == pytest.approx(30e-3 + 2 * 8e-3, rel=0.01)
+    assert high - low == pytest.approx(30e-3 + 2 * 1.5 * 8e-3, rel=0.01)
 
     assert len((out / "compensator.py").read_text().splitlines()) <= 20
     run = [sys.executable, "-W", "error", str(out / "compensator.py")]
