@@ -17,7 +17,7 @@ const INTENTION_TIME: f64 = 0.1;
 ///
 /// ```text
 /// tremor             s <- s + (u - s) period / 0.1 s,
-///                    rate <- exp(-period / 1 s) rate + reversals of u - s,   rate > tremor_rate
+///                    rate <- exp(-period / 1 s) rate + reversals of u - s where u changes,   rate > tremor_rate
 /// overcompensation   d (m - m0) > ahead_ratio d (u - u0)   and
 ///                    d (m - m0) - d (u - u0) > ahead   and   d (m - u) > ahead,
 ///                    or d (delta0 - delta) > offset_decrease ahead
@@ -27,7 +27,8 @@ const INTENTION_TIME: f64 = 0.1;
 /// with the reference u, its slow part s, the measured tip m, the contact offset delta that the stroke uses, the values
 /// u0, m0 and delta0 when the reference turned last, the direction d since then, and ahead = `ahead_limit` `width_limit`. A tremor's
 /// swings are at least `tremor_swing` and shorter than `width_limit`; a small one reverses no reference that
-/// moves, only what is left without the slow part.
+/// moves, only what is left without the slow part. While the value of a slow or coarse input device stays the same, the slow
+/// part comes back to it: that is no reversal.
 ///
 /// While the slack is crossed, the tip stays behind its reference; it moves farther only if there was less slack than was
 /// compensated. The three conditions together exclude a tip that had been left behind before, and a bias of the images.
@@ -86,10 +87,12 @@ impl<const N: usize> MotionMonitor<N> {
         for ((axis, reference), width) in dofs.zip(self.settings.width_limit) {
             axis.reversals *= self.decay;
             let slow = axis.slow.get_or_insert(reference);
-            let swing = axis.shake.update(reference - *slow);
-            *slow += self.follow * (reference - *slow);
-            if swing.is_some_and(|swing| swing < width) {
-                axis.reversals += 1.0;
+            let fast = reference - *slow;
+            *slow += self.follow * fast;
+            let last = core::mem::replace(&mut axis.input, reference);
+            if reference - last != 0.0 {
+                let swing = axis.shake.update(fast);
+                axis.reversals += f64::from(swing.is_some_and(|swing| swing < width));
             }
             is_tremor |= axis.reversals > self.settings.tremor_rate;
         }
@@ -122,7 +125,8 @@ impl<const N: usize> MotionMonitor<N> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct DofMotion {
     ahead: f64,
-    /// Slow part of the reference, and the turning points of the rest, by every control tick.
+    /// The last reference, its slow part, and the turning points of the rest where the reference changes.
+    input: f64,
     slow: Option<f64>,
     shake: TurningPoints,
     reversals: f64,
@@ -147,6 +151,7 @@ impl DofMotion {
         };
         Self {
             ahead: f64::NAN,
+            input: f64::NAN,
             slow: None,
             shake: TurningPoints::new(dof.update_distance * tremor_swing),
             reversals: 0.0,

@@ -169,6 +169,31 @@ fn a_tremor_that_reverses_no_moving_reference_is_seen_and_a_voluntary_motion_is_
     assert_eq!(raised(10.0, voluntary, voluntary), Flags::NONE);
 }
 
+#[test]
+fn the_steps_of_a_slow_or_coarse_input_device_are_no_tremor_but_a_tremor_in_them_is() {
+    let voluntary = |time: f64| 20.0 * UNIT * (2.0 * time).sin();
+    let tremor = |time: f64| UNIT * (core::f64::consts::TAU * 8.0 * time).sin();
+    // Period of the device, in ticks, and its count.
+    for (every, count) in [(4.0, 0.0), (10.0, 0.0), (1.0, 0.3), (1.0, 2.0), (4.0, 0.5)] {
+        let given = |motion: &dyn Fn(f64) -> f64, time: f64| {
+            let value = motion((time / (every * PERIOD) + 1e-9).floor() * every * PERIOD);
+            if count > 0.0 {
+                (value / (count * UNIT)).round() * count * UNIT
+            } else {
+                value
+            }
+        };
+        let steps = |time: f64| given(&voluntary, time);
+        assert_eq!(raised(10.0, steps, steps), Flags::NONE, "{every}, {count}");
+        let both = |time: f64| given(&|at| voluntary(at) + tremor(at), time);
+        assert_eq!(
+            raised(2.0, both, steps),
+            Flags::of(Flag::Tremor),
+            "{every}, {count}"
+        );
+    }
+}
+
 /// An oscillation whose amplitude is so many times as large after each swing.
 fn growing(growth: f64, period: f64) -> impl Fn(f64) -> f64 {
     move |time| {
