@@ -26,6 +26,8 @@ const START: f64 = 7.0;
 /// Largest rate at which the command's speed grows beyond the reference's, in `width_limit` / s^2: a tremor, which reverses
 /// ten times a second, must not drive the motors across the slack each time.
 pub(crate) const ACCELERATION: f64 = 40.0;
+/// Motion that takes back compensation no longer in use, over that of the reference: the tip moves half as fast at least.
+const WITHDRAWAL: f64 = 0.5;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
@@ -54,7 +56,8 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// The steady command alone leaves the tip off the reference, because direction and plays keep turning. One DOF alone:
 /// 0 <= dc / du <= `K_b`, Eq. (2). Where all DOFs of a group rest, no command moves, but each moves where another does: while
 /// rotation turns, the friction that held the insertion is released.
-/// A share of the compensation s makes it dc = du + s (dc - du).
+/// With a share s of the compensation the command is s dc + (1 - s) (du + r), where the motion r takes back what the command has
+/// beyond the reference, |r| <= min(WITHDRAWAL, K_b - 1) |du|: without compensation it is the reference in the end.
 ///
 /// Wrong as far as the estimate is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +79,7 @@ pub struct VectorLaw<const N: usize> {
     limits: [PlayLimit; N],
     direction: Direction<N>,
     reference: Option<[f64; N]>,
-    /// Reference less command.
+    /// Command less reference.
     lead: [f64; N],
     /// The command c (N,) [m or rad]; NaN before the first reference.
     pub command: [f64; N],
@@ -207,19 +210,25 @@ impl<const N: usize> VectorLaw<N> {
         let (mut command, gain) = (self.command, self.settings.free_gain);
         // Without gain there is no compensation.
         let share = if gain > 1.0 { self.share } else { 0.0 };
+        let back = if share < 1.0 {
+            self.withdrawal(motion, length)
+        } else {
+            [0.0; N]
+        };
         let states = self.surplus.iter_mut().zip(&mut self.rested).zip(ticks);
         let dofs = command.iter_mut().zip(states);
         let dofs = dofs.zip(taken).zip(length).zip(self.transmission.dofs());
-        let parts = reference.into_iter().zip(self.lead).zip(motion).zip(step);
+        let parts = reference.into_iter().zip(self.lead).zip(motion);
+        let parts = parts.zip(step).zip(back);
         for (((((command, state), taken), length), dof), parts) in dofs.zip(parts) {
             if length < REST {
                 continue;
             }
-            let (((reference, lead), motion), step) = parts;
+            let ((((reference, lead), motion), step), back) = parts;
             let before = *command;
             let ((surplus, rested), ticks) = state;
             (*surplus, *rested) = (taken / ticks, 0.0);
-            *command = reference + lead + share * (step * dof.unit - motion);
+            *command = reference + lead + share * (step * dof.unit - motion) + (1.0 - share) * back;
             if dof.is_alone {
                 // Eq. (2), to the last bit.
                 let farthest = before + gain * motion;
@@ -339,6 +348,20 @@ impl<const N: usize> VectorLaw<N> {
     /// For each DOF the length of a motion (N,) of its group, which is in units, in `width_limit`.
     fn norm(&self, motion: [f64; N]) -> [f64; N] {
         self.dot(motion, motion).map(libm::sqrt)
+    }
+
+    /// What takes back the lead (N,) [m or rad] in a motion of the reference (N,), with the lengths (N,) of its groups.
+    fn withdrawal(&self, motion: [f64; N], lengths: [f64; N]) -> [f64; N] {
+        let most = WITHDRAWAL.min(self.settings.free_gain - 1.0);
+        let lead = self.norm(over(self.lead, self.transmission.unit()));
+        let share = zip_with(lengths, lead, |moved, lead| (most * moved / lead).min(1.0));
+        let back = zip_with(self.lead, share, |lead, share| -lead * share);
+        let fastest = zip_with(self.step_limit, motion, |limit, motion| {
+            limit.max(motion.abs())
+        });
+        let whole = zip_with(motion, back, |motion, back| motion + back);
+        let whole = zip_with(whole, fastest, |whole, most| whole.max(-most).min(most));
+        subtract(whole, motion)
     }
 
     /// For each DOF's group the ticks (N,) in which its reference has come to its next value: of a slow device several.

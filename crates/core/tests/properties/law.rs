@@ -372,6 +372,39 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
     }
 }
 
+/// Compensation that is switched off: the command returns to the reference within a travel of twice the lead.
+#[test]
+fn without_compensation_the_command_returns_to_the_reference() {
+    let mut random = Random(3);
+    for group in [[0, 1], [0, 0]] {
+        let mut checked = Checked::<2>::new(group, 5.0, &mut random);
+        let width = checked.bounds.width_limit;
+        let at = |part: f64| [part * width[0], -0.7 * part * width[1]];
+        let lead = |checked: &Checked<2>| {
+            let lead =
+                core::array::from_fn(|dof| checked.law.command[dof] - checked.reference[dof]);
+            checked.dot([true; 2], lead, lead).sqrt()
+        };
+        let mut part = 0.0;
+        for _ in 0..2_000 {
+            part += 0.001;
+            checked.step(at(part), 1.0);
+        }
+        let mut before = lead(&checked);
+        assert!(before > 0.05, "{before}");
+        (checked.share, checked.law.share) = (0.0, 0.0);
+        // The second moves 0.7 times as far, and its lead may be all of it.
+        let most = part + 2.0 * before / 0.7;
+        while part < most {
+            part += 0.001;
+            checked.step(at(part), 1.0);
+            assert!(lead(&checked) <= before + 1e-12);
+            before = lead(&checked);
+        }
+        assert!(before < 1e-12, "{before}");
+    }
+}
+
 /// A device that gives each n-th value of a motion: after a reversal the command gains as much in the same time, and at most as
 /// much as the bound of its speed allows; after a longer rest than `input_age` as little as in one tick.
 #[test]
