@@ -45,7 +45,7 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period,
-///           |dc| - |du| <= n (s + n ACCELERATION period^2),   s <- (|dc| - |du|) / n, 0 when w reverses
+///           |dc| - |du| <= n (v + n ACCELERATION period^2),   v <- (|dc| - |du|) / n, 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
 ///           rate = change_rate (1 + (START / travel)^2) / ratio^2
