@@ -116,7 +116,7 @@ def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
     """What a person has to check in a `compensator`."""
     found = [
         "[[dof]] is in m or rad, with the tip's zero; [actuators] has the motors of the record.",
-        f"range: motion of the record and {MARGIN:g} slacks more to both sides. May motors go there?",
+        f"range: motion of the record and {MARGIN:g} slacks more. May your motors go there?",
         "law.change_rate: of a sensor that is never wrong; 0.01 where it may be, as images.",
     ]
     for name, (record, _) in parts.items():
