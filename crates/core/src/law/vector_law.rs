@@ -57,7 +57,7 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// 0 <= dc / du <= `K_b`, Eq. (2). Where all DOFs of a group rest, no command moves, but each moves where another does: while
 /// rotation turns, the friction that held the insertion is released.
 /// With a share s of the compensation the command is s dc + (1 - s) (du + r), where the motion r takes back what the command has
-/// beyond the reference, |r| <= min(WITHDRAWAL, K_b - 1) |du|: without compensation it is the reference in the end.
+/// beyond the reference, |r| <= min(WITHDRAWAL, `K_b` - 1) |du|: without compensation it is the reference in the end.
 ///
 /// Wrong as far as the estimate is.
 #[derive(Debug, Clone, Copy, PartialEq)]
