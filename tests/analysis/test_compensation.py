@@ -92,6 +92,16 @@ def test_the_loop_is_simulated_on_the_fastest_strokes_of_a_long_record() -> None
     assert len(part.command) == pytest.approx(5_000, rel=0.02)
 
 
+def test_a_slow_sensor_is_not_taken_for_a_silent_one() -> None:
+    """Of a tip each second the loop would lose its compensation: each is later than `frame_gap`."""
+    verdict = judge(repeated(2, every=50))
+    settings = compensator({"tip": (verdict.record, verdict.found)})
+    assert settings["safety"]["frame_gap"] == pytest.approx(3.0)
+    assert "safety" not in compensator({"tip": (repeated(1), verdict.found)})
+    assert verdict.compensation is not None
+    assert verdict.compensation.after < 0.3 * verdict.compensation.before
+
+
 def test_a_long_record_with_few_tips_is_simulated_whole() -> None:
     record = repeated(10, every=12_000)
     found = judge(repeated(2)).found

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tautscope.analysis.compensator import compensator, scale_of
+from tautscope.analysis.compensator import GAP, LONGEST_GAP, compensator, scale_of, tip_interval
 from tautscope.analysis.delayed_play import turns
 from tautscope.analysis.identification import Identification, Interval
 from tautscope.analysis.models import prandtl_ishlinskii
@@ -25,8 +25,6 @@ STROKES = 20
 """Strokes of a longer record that are simulated, at their own speed where `LONGEST` is enough."""
 UNTIMED = 0.02
 """Interval of samples without a time [s]."""
-LONGEST_INTERVAL = 0.1
-"""Between two measured tips of the simulation [s]."""
 LEAST_REDUCTION = 0.1
 """Of the RMS error, from which on the compensator helps."""
 FITTED = 16_000
@@ -140,8 +138,7 @@ def run(
     ticks = np.arange(0, time[-1], PERIOD)
     motors = np.interp(ticks, time, record.command)
     reference = np.array([actuators.dofs([each]) for each in motors.tolist()])
-    interval = float(np.median(np.diff(time[np.isfinite(record.measured)])))
-    every = max(1, round(min(interval, LONGEST_INTERVAL) / PERIOD))
+    every = max(1, round(min(tip_interval(record), LONGEST_GAP / GAP) / PERIOD))
     delay = max(config.measurement.delays, default=0.0)
     late = round(delay / PERIOD)
     noises = scale * np.random.default_rng(0).normal(0, noise, len(ticks))

@@ -10,6 +10,7 @@ import numpy as np
 
 from tautscope._core import MOST_RANGE
 from tautscope.analysis.identification import Identification
+from tautscope.config import Config
 from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
@@ -18,6 +19,9 @@ MARGIN, HASTE = 1.5, 2.0
 that is followed over that of the record."""
 CHANGE_RATE = 0.1
 """Of the law: its default is for images, of which some are wrong; a record has a sensor."""
+GAP, LONGEST_GAP = 3.0, 5.0
+"""Time without a tip after which the sensor counts as silent: in intervals of the record, and at
+most [s]."""
 UNNAMED = 1e-3
 """Metres per unit of a tip whose unit the file does not name, or a thousandth of it, and so on."""
 _LARGEST = {"m": 1.0, "rad": 100.0, "": 0.1}
@@ -56,6 +60,11 @@ def scale_of(record: Record) -> float:
     return scale
 
 
+def tip_interval(record: Record) -> float:
+    """Median interval between two measured tips [s, or samples without a time]."""
+    return float(np.median(np.diff(record.clock[np.isfinite(record.measured)])))
+
+
 def late_by(record: Record, found: Identification) -> float:
     """Delay, if it differs from 0 by more than chance and half a sample, else 0."""
     clock = record.clock
@@ -74,7 +83,7 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     Args:
         parts: Name of a degree of freedom -> its record, and what was identified.
     """
-    dofs, noises, delays = [], [], []
+    dofs, noises, delays, gap = [], [], [], Config().safety.frame_gap
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
         scale = scale_of(record)
@@ -95,6 +104,7 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
             speeds = np.abs(np.diff(path))[steps > 0] / steps[steps > 0]
             dof["speed"] = min(HASTE * float(np.quantile(speeds, 0.99)) + limit / 10, 1000.0)
             delays.append(max(late_by(record, found), 0.0))
+            gap = max(gap, min(GAP * tip_interval(record), LONGEST_GAP))
         dofs.append(dof)
         noises.append(scale * found.noise / limit)
         gains.append(1 / (scale * found.gain))
@@ -109,6 +119,8 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     if any(delays):
         document["measurement"]["delays"] = [float(np.mean(delays))]
         document["safety"] = {"frame_age": max(0.3, 1.5 * max(delays))}
+    if gap > Config().safety.frame_gap:
+        document["safety"] = document.get("safety", {}) | {"frame_gap": gap}
     return {name: _rounded(section) for name, section in document.items()}
 
 
