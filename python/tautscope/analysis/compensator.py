@@ -83,7 +83,8 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     Args:
         parts: Name of a degree of freedom -> its record, and what was identified.
     """
-    dofs, noises, delays, gap = [], [], [], Config().safety.frame_gap
+    dofs, noises, delays, usual_gap = [], [], [], Config().safety.frame_gap
+    gap = usual_gap
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
         scale = scale_of(record)
@@ -116,11 +117,12 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         "measurement": {"tip_deviation": max(1e-3, *noises)},
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
+    safety = {"frame_gap": gap} if gap > usual_gap else {}
     if any(delays):
         document["measurement"]["delays"] = [float(np.mean(delays))]
-        document["safety"] = {"frame_age": max(0.3, 1.5 * max(delays))}
-    if gap > Config().safety.frame_gap:
-        document["safety"] = document.get("safety", {}) | {"frame_gap": gap}
+        safety["frame_age"] = max(0.3, 1.5 * max(delays))
+    if safety:
+        document["safety"] = safety
     return {name: _rounded(section) for name, section in document.items()}
 
 
@@ -129,7 +131,7 @@ def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
     found = [
         "[[dof]] is in m or rad, with the tip's zero; [actuators] has the motors of the record.",
         f"range: motion of the record and {MARGIN:g} slacks more. May your motors go there?",
-        "law.change_rate: of a sensor that is never wrong; 0.01 where it may be, as images.",
+        f"law.change_rate: for a sensor that is never wrong, else {Config().law.change_rate:g}.",
     ]
     for name, (record, _) in parts.items():
         unit, scale = record.units[1], scale_of(record)

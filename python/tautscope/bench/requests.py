@@ -17,10 +17,11 @@ from tautscope.errors import ConfigError
 def raise_errors_of_threads() -> Iterator[None]:
     """Raise the first error that ends a thread, in the main thread, which it interrupts."""
     errors: list[BaseException] = []
+    main = threading.get_ident()
 
     def interrupt(thread: threading.ExceptHookArgs) -> None:
         errors.append(thread.exc_value or thread.exc_type())
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        signal.pthread_kill(main, signal.SIGINT)
 
     hook, threading.excepthook = threading.excepthook, interrupt
     try:

@@ -74,7 +74,7 @@ pub struct VectorLaw<const N: usize> {
     surplus: [f64; N],
     /// Ticks since each DOF's group moved last.
     rested: [f64; N],
-    /// Most of these in which a slow input device still moves, 1 or above.
+    /// Most of these in which a slow input device still moves.
     most_rested: f64,
     limits: [PlayLimit; N],
     direction: Direction<N>,
