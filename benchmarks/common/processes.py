@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -45,7 +46,7 @@ def run_parallel(
         yield from _run_on_cluster(function, jobs, scheduler)
         return
     with ProcessPoolExecutor(
-        workers, mp_context=multiprocessing.get_context("spawn"), initializer=limit_threads
+        workers, mp_context=multiprocessing.get_context("spawn"), initializer=prepare_worker
     ) as pool:
         running = {pool.submit(function, job): job for job in jobs}
         try:
@@ -74,7 +75,7 @@ def _run_on_cluster(
         cluster = scheduler
     with distributed.Client(cluster) as client:
         try:
-            client.register_worker_callbacks(limit_threads)
+            client.register_worker_callbacks(prepare_worker)
             # Not pure: equal jobs are not merged, and nothing is reused from another campaign.
             running = {client.submit(function, job, pure=False): job for job in jobs}
             try:
@@ -89,8 +90,12 @@ def _run_on_cluster(
                 cluster.close()
 
 
-def limit_threads() -> None:
-    """Use one thread per process, so that one process per core is the best choice."""
+def prepare_worker() -> None:
+    """Use one thread per process, so that one process per core is the best choice, and log nothing.
+
+    What a loop warns of is in the row of its run.
+    """
+    logging.getLogger("tautscope").setLevel(logging.ERROR)
     os.environ["OMP_NUM_THREADS"] = "1"
     import cv2  # noqa: PLC0415  the parent process renders no images
 

@@ -46,6 +46,24 @@ def test_missing_values_and_outliers_are_left_out(seed: int) -> None:
         assert np.isnan(verdict.record.measured[50::100]).all()
 
 
+def test_a_long_rest_before_the_motion_is_left_out() -> None:
+    record = simulate("play", 0).record
+    count = len(record.command) + 100
+    rows = np.arange(2, 2 + count + len(record.command))
+    rested = replace(
+        record,
+        command=np.concatenate([np.full(count, record.command[0]), record.command]),
+        measured=np.concatenate([np.full(count, record.measured[0]), record.measured]),
+        time=None if record.time is None else np.arange(len(rows)) * np.diff(record.time)[0],
+        rows=rows,
+    )
+    verdict, alone = judge(rested), judge(record)
+    assert str(verdict.findings[0]) == (
+        f"command: {count} samples of rest before the motion, left out (lines 2 to {count + 1})"
+    )
+    assert verdict.found.width.value == pytest.approx(alone.found.width.value, rel=1e-3)
+
+
 @pytest.mark.parametrize("value", [-9999.0, -1.0e6, 999.9, 32767.0])
 def test_values_that_mark_missing_tips_are_left_out(value: float) -> None:
     record = simulate("play", 1).record

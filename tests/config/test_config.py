@@ -250,6 +250,13 @@ def test_replace_refuses_a_key_below_a_value(path: str) -> None:
         Config().replace(**{path: 1})
 
 
+def test_a_tick_is_not_a_stall() -> None:
+    changes = {"control.period": 0.1, "control.history": 2.0}
+    with pytest.raises(ConfigError, match=r"safety\.stall: got 0\.1, expected at least 0\.2"):
+        Config().replace(**changes)
+    assert Config().replace(**changes, **{"safety.stall": 0.2}).control.period == 0.1
+
+
 def test_a_delay_is_within_the_history() -> None:
     config = axes(1, width_limit=1.0)
     longest = config.control.history

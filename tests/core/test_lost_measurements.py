@@ -1,4 +1,7 @@
-"""A loop without measurements: compensation fades, and the tip then follows as without it."""
+"""A loop without measurements: compensation fades, which the log says, and the tip then follows as
+without it."""
+
+import logging
 
 import numpy as np
 import pytest
@@ -35,3 +38,29 @@ def errors(compensate: bool, share: float = 1.0) -> np.ndarray:
 def test_the_tip_follows_as_without_compensation(share: float) -> None:
     """Half of the slack to each side, not all of it to one; also where it is switched off."""
     np.testing.assert_allclose(errors(True, share), errors(False), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gap", "late", "ahead", "cause"),
+    [
+        (0.04, 0.0, 0.0, None),
+        (0.25, 0.0, 0.0, "safety.frame_gap"),
+        (0.04, 0.4, 0.0, "frame_age"),
+        (0.04, 0.0, 1e9, "clock of the camera or sensor"),
+    ],
+)
+def test_the_log_says_once_why_nothing_is_compensated(
+    gap: float, late: float, ahead: float, cause: str | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A sensor that is too slow or too late, or has another clock, and one in order."""
+    config = from_document({"dof": [DOF]})
+    rig, loop = PlayRig(config, [4e-3]), HysteresisReduction(config)
+    sample, due = rig.reset(), 0.0
+    while sample.time < LOST:
+        sample = rig.step(loop.step([0.01 * np.sin(sample.time)], sample.time))
+        if sample.time >= due + late:
+            loop.on_tip(sample.true_state, due + ahead)
+            due += gap
+    lines = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+    assert len(lines) == (cause is not None)
+    assert all("Compensation fades out" in line and str(cause) in line for line in lines)

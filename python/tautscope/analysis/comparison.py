@@ -185,14 +185,7 @@ def thinned(record: Record) -> tuple[Record, int]:
     kept = np.union1d(extremes(record.command, size), last)
     measured = np.full(len(record.command), np.nan)
     measured[last] = record.measured[last]
-    time = None if record.time is None else record.time[kept]
-    return replace(
-        record,
-        command=record.command[kept],
-        measured=measured[kept],
-        time=time,
-        rows=record.rows[kept],
-    ), size
+    return replace(record, measured=measured).part(kept), size
 
 
 def check_motion(record: Record) -> int:
@@ -207,11 +200,12 @@ def check_motion(record: Record) -> int:
         raise RecordError("measured", f"{len(with_tip)} tips beside commands", "at least 2")
     half = int(with_tip[len(with_tip) // 2])
     first = with_tip[with_tip < half]
-    for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
+    for name, values, moves in (
+        ("command", record.command[:half], "a signal that moves"),
+        ("measured", record.measured[first], "a tip that moves, in strokes longer than the slack"),
+    ):
         if np.ptp(values) == 0:
-            raise RecordError(
-                name, f"{values[0]:g} throughout the first half", "a signal that moves"
-            )
+            raise RecordError(name, f"{values[0]:g} throughout the first half", moves)
     return half
 
 

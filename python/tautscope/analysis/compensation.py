@@ -99,14 +99,7 @@ def as_played(record: Record, found: Identification) -> tuple[Record, Identifica
     time = (clock[kept] - clock[kept][0]) / speed
     scale = (1.0 if record.is_timed else UNTIMED) / speed
     delay = Interval(*(scale * each for each in vars(found.delay).values()))
-    part = replace(
-        record,
-        command=record.command[kept],
-        measured=record.measured[kept],
-        time=time,
-        rows=record.rows[kept],
-    )
-    return part, replace(found, delay=delay)
+    return replace(record.part(kept), time=time), replace(found, delay=delay)
 
 
 def _fastest_part(record: Record, found: Identification, clock: Floats) -> slice:

@@ -63,8 +63,15 @@ class Finding:
 
 
 def without_errors(record: Record) -> tuple[Record, list[Finding]]:
-    """Unwrap counters, and leave out values that were not measured."""
+    """Leave out a long rest before the motion and what was not measured; unwrap counters."""
     findings = list(_time_findings(record))
+    moved = np.flatnonzero(record.command != record.command[0])
+    if len(moved) and moved[0] > len(record.command) / 2:
+        first = int(moved[0]) - 1
+        what = f"{first} samples of rest before the motion, left out"
+        lines = int(record.rows[0]), int(record.rows[first - 1])
+        findings.append(Finding("command", what, (lines,)))
+        record = record.part(slice(first, None))
     signals = {"command": record.command, "tip": record.measured}
     for name, values in signals.items():
         unwrapped, period, at = _unwrapped(values)

@@ -180,7 +180,6 @@ def judge(
     Raises:
         RecordError: Command or tip does not move in the first half.
     """
-    check_motion(record)
     record, findings = without_errors(record)
     check_motion(record)
     record, found, repeated = identify_without_repeats(record)

@@ -84,6 +84,9 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         check_axes(self.dof, self.kinematics, self.safety)
         check_ranges(self)
         check_topics(self.dof, self.kinematics, self.measurement)
+        stall, least = self.safety.stall, 2 * self.control.period
+        allowed = f"at least {least:g}, two of control.period: each tick would stop the motion"
+        require(stall >= least, "safety.stall", stall, allowed)
         for index, delay in enumerate(self.measurement.delays):
             allowed = f"at most control.history = {self.control.history:g}"
             require(delay <= self.control.history, f"measurement.delays[{index}]", delay, allowed)

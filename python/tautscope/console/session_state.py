@@ -14,16 +14,8 @@ from tautscope.console.state import (
     show_truth,
     values,
 )
-from tautscope.loop.safety import Reaction, advice, by_urgency
+from tautscope.loop.safety import advice, by_urgency
 
-_EFFECTS = {
-    Reaction.HOLD_ESTIMATE: "The slack is held as estimated so far",
-    Reaction.FADE: "Compensation fades out with motion",
-    Reaction.PASS_THROUGH: "No compensation; the command follows the reference",
-    Reaction.HOLD_MOTION: "Motion is held",
-    Reaction.QUICK_STOP: "Quick stop",
-    Reaction.DISABLE: "The motors are disabled",
-}
 _MAY_MOVE = "THE MOTORS MAY STILL MOVE"
 
 
@@ -106,10 +98,8 @@ def _motion(control: RigControl) -> tuple[str, str]:
 def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
     supervision, program = run.loop.supervision, control.operator.program
     motion = "moving" if control.operator.is_moving else "ready"
-    flags = by_urgency(supervision.flags)
-    if supervision.reaction in _EFFECTS:
-        text = f"{_EFFECTS[supervision.reaction]}: {advice(flags[0])}"
-        return ("held" if run.is_held else motion), text
+    if supervision.effect:
+        return ("held" if run.is_held else motion), supervision.effect
     if control.compensation == 0:
         text = "Compensation is off; the command follows the reference"
     else:
@@ -118,7 +108,8 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
         text += f"; the log has ended: {run.log.failure}"
     if program is not None:
         text += f"; running: {program.name}"
-    return motion, f"{text}. In force: {', '.join(flags)}." if flags else f"{text}."
+    flags = ", ".join(by_urgency(supervision.flags))
+    return motion, f"{text}. In force: {flags}." if flags else f"{text}."
 
 
 def _drives(control: RigControl) -> str:

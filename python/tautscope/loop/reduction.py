@@ -181,6 +181,7 @@ class HysteresisReduction:
         self._actuators = Actuators(config) if is_limited else None
         self._limited: tuple[str, ...] = ()
         self._limited_before: set[str] = set()
+        self._logged: set[Reaction] = set()
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -532,6 +533,9 @@ class HysteresisReduction:
     ) -> Report:
         self.updates += 1
         now = self.supervision
+        if now.reaction not in self._logged and now.reaction.rank >= Reaction.FADE.rank:
+            self._logged.add(now.reaction)
+            _LOG.warning("at %.3f s: %s", captured_at, now.effect)
         limited = (f"{name} {LIMITED}" for name in self._limited)
         warnings = (*self._disabled, *now.flags, *limited)
         return Report(

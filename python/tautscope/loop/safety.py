@@ -30,15 +30,15 @@ REMEDIES: dict[str, str] = {
     "late_tick": "close other programs on this computer",
     "start_check": "check the signs and gains of the motors, then re-engage",
     "limit_cycle": "move more slowly",
-    "dropped": "check the cable of the camera",
+    "dropped": "check the camera or sensor; a slow one needs a larger safety.frame_gap",
     "frozen": "check the camera",
-    "clock": "check the clock of the camera",
-    "late": "check the load of this computer and the delay of the camera",
+    "clock": "check the clock of the camera or sensor",
+    "late": "check the load of this computer and the delay of the camera or sensor",
     "duplicate": "check the driver of the camera",
     "frame_rate": "check the clock and the rate of the camera",
     "swapped": "look in the image which band is which",
     "lost": "bring the bands into the image",
-    "innovation": "look at the image, and rest for a moment",
+    "innovation": "look at the image, or check sign and scale of the sensor, and rest for a moment",
     "merged": "bring both bands into the image",
     "unobservable": "bend the section a little",
     "overcompensation": "move slowly until the slack is learned",
@@ -91,6 +91,14 @@ class Reaction(StrEnum):
 
 
 _RANKS = {reaction: rank for rank, reaction in enumerate(Reaction)}
+_EFFECTS = {
+    Reaction.HOLD_ESTIMATE: "The slack is held as estimated so far",
+    Reaction.FADE: "Compensation fades out with motion",
+    Reaction.PASS_THROUGH: "No compensation; the command follows the reference",
+    Reaction.HOLD_MOTION: "Motion is held",
+    Reaction.QUICK_STOP: "Quick stop",
+    Reaction.DISABLE: "The motors are disabled",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +116,12 @@ class Supervision:
     flags: tuple[str, ...]
     latched: tuple[str, ...]
     lead: float
+
+    @property
+    def effect(self) -> str:
+        """What the reaction does, why, and what to do; empty where the loop does all it can."""
+        effect = _EFFECTS.get(self.reaction)
+        return f"{effect}: {advice(by_urgency(self.flags)[0])}" if effect else ""
 
 
 def disabled_monitors(config: Config) -> tuple[str, ...]:

@@ -83,6 +83,16 @@ class Record:
         samples = np.arange(len(self.command), dtype=np.float64)
         return self.time if self.is_timed and self.time is not None else samples
 
+    def part(self, samples: slice | NDArray[np.intp]) -> Record:
+        """The record of some samples; gaps and other counts stay those of the file."""
+        return replace(
+            self,
+            command=self.command[samples],
+            measured=self.measured[samples],
+            time=None if self.time is None else self.time[samples],
+            rows=self.rows[samples],
+        )
+
 
 def read_record(
     path: str | PathLike[str] | Sheet,

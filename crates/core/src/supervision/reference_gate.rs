@@ -55,7 +55,7 @@ impl<const N: usize> ReferenceGate<N> {
     /// The gate before the first reference, for a control period in s.
     ///
     /// # Errors
-    /// A value is not a finite number above 0, or `late_tick` is not above 1.
+    /// A value is not a finite number above 0, `late_tick` is not above 1, or `stall` is below two periods.
     pub fn new(
         safety: &SafetySettings<N>,
         dofs: &[DofSettings; N],
@@ -65,7 +65,8 @@ impl<const N: usize> ReferenceGate<N> {
         let late = safety.late_tick;
         let is_late = late.is_finite() && late > 1.0;
         require(is_late, "late_tick", late, "finite, above 1")?;
-        require_positive("stall", safety.stall)?;
+        let is_above = safety.stall.is_finite() && safety.stall >= 2.0 * period;
+        require(is_above, "stall", safety.stall, "finite, at least two periods")?;
         Ok(Self {
             period,
             settings: *safety,

@@ -233,14 +233,15 @@ fn nothing_passes_that_is_not_finite_or_while_motion_is_held() {
 #[test]
 fn settings_out_of_range_are_named() {
     type Change = fn(&mut SafetySettings);
-    let changes: [(&str, Change); 7] = [
+    let changes: [(&str, Change); 8] = [
         ("reference_speed", |s| s.reference_speed[1] = 0.0),
         ("command_speed", |s| s.command_speed[2] = f64::NAN),
         ("reference_time", |s| s.reference_time = f64::NAN),
         ("reference_age", |s| s.reference_age = -1.0),
         ("late_tick", |s| s.late_tick = 1.0),
         ("late_tick", |s| s.late_tick = f64::INFINITY),
-        ("stall", |s| s.stall = 0.0),
+        ("stall", |s| s.stall = 1.9 * PERIOD),
+        ("stall", |s| s.stall = f64::NAN),
     ];
     for (field, change) in changes {
         let mut wrong = safety();
