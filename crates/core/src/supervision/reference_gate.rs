@@ -62,11 +62,11 @@ impl<const N: usize> ReferenceGate<N> {
         period: f64,
     ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
-        let late = safety.late_tick;
+        let (late, stall) = (safety.late_tick, safety.stall);
         let is_late = late.is_finite() && late > 1.0;
         require(is_late, "late_tick", late, "finite, above 1")?;
-        let is_above = safety.stall.is_finite() && safety.stall >= 2.0 * period;
-        require(is_above, "stall", safety.stall, "finite, at least two periods")?;
+        let is_long = stall.is_finite() && stall >= 2.0 * period;
+        require(is_long, "stall", stall, "finite, at least two periods")?;
         Ok(Self {
             period,
             settings: *safety,
