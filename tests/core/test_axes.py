@@ -94,6 +94,25 @@ def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[flo
     np.testing.assert_allclose(2 * found.half_width, widths, rtol=0.25)
 
 
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_a_wrong_sign_of_one_sensor_ends_compensation(profile: Literal["best", "paper"]) -> None:
+    """The tip then follows as without it, in place of farther away; with `paper` at a difference."""
+    config, look = axes(2, width_limit=1.2).replace(profile=profile), on_tip(0.005)
+
+    def reversed_look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
+        return loop.on_tip(tip * [1, -1], at, np.eye(2) * 0.005**2)
+
+    off = operate(HysteresisReduction(config, compensate=False), Plays([0.6] * 2), look)
+    loop = HysteresisReduction(config)
+    left = operate(loop, Plays([0.6] * 2), reversed_look)
+    assert loop.supervision.reaction == "pass_through"
+    assert "start_check" in loop.supervision.flags
+    if profile == "best":
+        np.testing.assert_allclose(left, off, rtol=0.05)
+    loop.engage()
+    assert "start_check" not in loop.supervision.flags
+
+
 def test_axes_that_share_a_friction_release_each_other() -> None:
     """A shaft that slides and turns in a channel: Coulomb friction on a friction ellipse."""
     unit, half = np.array([12e-3, 2.6]), np.array([3.5e-3, 0.7])

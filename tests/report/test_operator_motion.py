@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from tautscope.config import Config
+from tautscope.config import Config, DofEntry
 from tautscope.dof import Dof
 from tautscope.report.operator_motion import (
     OperatorResults,
     evaluate_operator_motion,
+    motion_of,
     operator_motion,
 )
 from tautscope.report.tracking_bound import tracking_bound
@@ -95,3 +96,19 @@ def test_every_twin_has_its_own_motion() -> None:
     disturbed = operator_motion(CONFIG, is_disturbed=True)
     assert disturbed.is_disturbed
     assert disturbed.experiment == CONFIG.experiment
+
+
+def test_the_motion_of_another_robot_keeps_to_its_ranges_and_speeds() -> None:
+    """A wide range and a small speed, and the other way round."""
+    dofs = (
+        DofEntry(name="slow", width_limit=0.3, range=(-1.5, 2.5)),
+        DofEntry(name="near", width_limit=0.3, range=(-0.2, 0.2), speed=5.0),
+    )
+    motion = motion_of(Config(dof=dofs), 3, 60.0)
+    time = np.arange(0.0, 60.0, PERIOD)
+    moved = np.array([motion(at) for at in time])
+    fastest = np.abs(np.diff(moved, axis=0)).max(axis=0) / PERIOD
+    assert (fastest <= [0.6, 5.0]).all()
+    np.testing.assert_allclose(fastest[0], 0.6, rtol=0.2)
+    np.testing.assert_allclose(np.ptp(moved[:, 1]), 0.24, rtol=0.2)
+    np.testing.assert_allclose(moved[0], [0.5, 0.0])

@@ -162,7 +162,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_LATE_TICK = 15,
     // The rig reports a fault of a drive or of its bus.
     TAUTSCOPE_FLAG_DRIVE_FAULT = 16,
-    // The rig reports that the tip does not follow its command in sign or scale.
+    // The tip moves against its command.
     TAUTSCOPE_FLAG_START_CHECK = 17,
     // The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     TAUTSCOPE_FLAG_WIDTH_LIMIT = 18,

@@ -327,7 +327,7 @@ pub enum TautscopeFlag {
     LateTick = 15,
     /// The rig reports a fault of a drive or of its bus.
     DriveFault = 16,
-    /// The rig reports that the tip does not follow its command in sign or scale.
+    /// The tip moves against its command.
     StartCheck = 17,
     /// The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     WidthLimit = 18,

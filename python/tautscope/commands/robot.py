@@ -55,7 +55,7 @@ def run(
     seconds = 2 * motion.duration
     announce("2 runs", seconds, seconds * BYTES_PER_SECOND, folder)
     if getattr(options, "rig", None) is not None:
-        confirm_motion(options, "over 60 % of each range. Keep", config)
+        confirm_motion(options, "over up to 60 % of each range. Keep", config)
     runs: list[Recording] = []
     with recording_saved(folder), exit_on_signals(), progress_bar("2 runs") as progress:
 

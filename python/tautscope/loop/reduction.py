@@ -181,6 +181,7 @@ class HysteresisReduction:
         self._actuators = Actuators(config) if is_limited else None
         self._limited: tuple[str, ...] = ()
         self._limited_before: set[str] = set()
+        self._least_logged = Reaction.FADE if compensate else Reaction.HOLD_MOTION
         self._logged: set[Reaction] = set()
 
     def __repr__(self) -> str:
@@ -533,7 +534,7 @@ class HysteresisReduction:
     ) -> Report:
         self.updates += 1
         now = self.supervision
-        if now.reaction not in self._logged and now.reaction.rank >= Reaction.FADE.rank:
+        if now.reaction.rank >= self._least_logged.rank and now.reaction not in self._logged:
             self._logged.add(now.reaction)
             _LOG.warning("at %.3f s: %s", captured_at, now.effect)
         limited = (f"{name} {LIMITED}" for name in self._limited)

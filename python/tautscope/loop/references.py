@@ -120,6 +120,8 @@ TREMOR, TREMOR_FREQUENCY = (0.1e-3, 0.01, 0.01), 8.0
 """Amplitude [m, rad, rad], and frequency [Hz]."""
 TREMOR_SHARE = 1 / 150
 """Amplitude for another robot [in that of the motion]."""
+FASTEST = 1.2
+"""Largest speed of a move that is no flick [amplitudes per s]."""
 FLICKS, PAUSES = 0.2, 0.1
 """Share of the moves that are flicks, and of the rests that are pauses."""
 
@@ -177,7 +179,7 @@ class OperatorMotion:
         while time < self.duration:
             least = rng.uniform(1.0, 4.0)
             target = sine.centre + sine.amplitude * rng.uniform(-1, 1)
-            rest, speed = rng.uniform(0.0, 1.5), 1.2 * sine.amplitude
+            rest, speed = rng.uniform(0.0, 1.5), FASTEST * sine.amplitude
             if self.is_disturbed:
                 if rng.uniform() < FLICKS:
                     least, speed = 0.0, 3 * sine.amplitude

@@ -9,7 +9,7 @@ import numpy as np
 from tautscope.config import Config, Sine
 from tautscope.dof import NamedDof
 from tautscope.errors import ConfigError
-from tautscope.loop.references import OperatorMotion
+from tautscope.loop.references import FASTEST, OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.rows import figure, rows_of
 from tautscope.report.tracking_bound import tracking_bound
@@ -20,7 +20,7 @@ FIRST_SEED = 40
 EVALUATED_AFTER = 40.0
 """Time after which a run counts; before it, the loop estimates the offsets [s]."""
 AMPLITUDE = 0.3
-"""Amplitude of another robot's motion about the middle of a range [share of the range]."""
+"""Largest amplitude of another robot's motion about the middle of a range [share of the range]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,9 @@ def operator_motion(config: Config, *, is_disturbed: bool = False) -> OperatorMo
 
 
 def motion_of(config: Config, seed: int, duration: float) -> OperatorMotion:
-    """An operator motion over the ranges of the degrees of freedom of any robot.
+    """An operator motion in the ranges of the degrees of freedom of any robot.
+
+    It is as wide as its speed allows, so that none is faster than `speed`.
 
     Raises:
         ConfigError: A degree of freedom has no range.
@@ -98,7 +100,8 @@ def motion_of(config: Config, seed: int, duration: float) -> OperatorMotion:
         if dof.range is None:
             raise ConfigError(f"dof[{index}].range", None, "a range, within which the tip moves")
         low, high = dof.range
-        sines.append(Sine(centre=(low + high) / 2, amplitude=AMPLITUDE * (high - low)))
+        amplitude = min(AMPLITUDE * (high - low), dof.largest_speed / FASTEST)
+        sines.append(Sine(centre=(low + high) / 2, amplitude=amplitude))
     return OperatorMotion(sines, seed, duration)
 
 

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::article::estimator::Triggers;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::all_finite;
+use crate::dof::{all_finite, zip_with};
 use crate::error::ConfigError;
 use crate::estimation::history::Entry;
 use crate::estimation::measurement::{Linear, Observed, Prior, Sensor};
@@ -123,6 +123,12 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
             seen,
             triggers,
         } = outcome;
+        if let (Some(past), Some(view)) = (past, seen) {
+            let measured = zip_with(view.state, view.observable, |value, is_known| {
+                if is_known { value } else { f64::NAN }
+            });
+            self.monitors.check_start(past.command, measured);
+        }
         let predicted_state = past.map_or([f64::NAN; N], |past| past.predicted_state);
         let unseen = || View {
             state: predicted_state,

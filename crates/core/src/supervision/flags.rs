@@ -69,7 +69,7 @@ flags! {
     LateTick = "late_tick",
     /// The rig reports a fault of a drive or of its bus.
     DriveFault = "drive_fault",
-    /// The rig reports that the tip does not follow its command in sign or scale.
+    /// The tip moves against its command.
     StartCheck = "start_check",
     /// The estimated slack or the lead of the command reached `width_limit` or `offset_limit`.
     WidthLimit = "width_limit",

@@ -12,5 +12,6 @@ pub(crate) mod reactions;
 pub(crate) mod reference_gate;
 pub(crate) mod reference_limiter;
 pub(crate) mod settings;
+pub(crate) mod start_check;
 pub(crate) mod supervisor;
 pub(crate) mod turning_points;

@@ -12,6 +12,7 @@ use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
 use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
+use crate::supervision::start_check::StartCheck;
 use crate::supervision::supervisor::{Event, Supervision, Supervisor};
 
 /// Sensors that a loop may have, each with its own rate and delay.
@@ -48,6 +49,7 @@ pub struct Monitors<const N: usize> {
     frames: [FrameGate<N>; SENSORS],
     rates: [FrameRate; SENSORS],
     motion: MotionMonitor<N>,
+    start: StartCheck<N>,
     supervisor: Supervisor<N>,
     play_limits: [PlayLimit; N],
     unit: [f64; N],
@@ -82,6 +84,7 @@ impl<const N: usize> Monitors<N> {
             frames: [FrameGate::new(safety, dofs)?; SENSORS],
             rates: [FrameRate::NEW; SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,
+            start: StartCheck::new(dofs.map(|dof| dof.start_deviation)),
             supervisor: Supervisor::new(safety)?,
             play_limits,
             unit: safety.width_limit,
@@ -256,6 +259,13 @@ impl<const N: usize> Monitors<N> {
         self.enabled(flags)
     }
 
+    /// Check whether the measured tip (N,) [m or rad] moves as the command of its time does.
+    pub(crate) fn check_start(&mut self, command: [f64; N], measured: [f64; N]) {
+        if self.start.update(command, measured) {
+            self.raise(Flag::StartCheck);
+        }
+    }
+
     /// Raise a flag of the rig.
     pub fn raise(&mut self, flag: Flag) {
         self.update(Source::Rig, self.enabled(Flags::of(flag)));
@@ -276,6 +286,7 @@ impl<const N: usize> Monitors<N> {
     pub fn engage(&mut self) {
         self.supervisor.engage();
         self.gate.engage();
+        self.start.restart();
     }
 
     /// The operator has seen the warnings.

@@ -103,7 +103,7 @@ pub static TABLE: [Rule; 27] = [
     rule(Flag::ReferenceInvalid, Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::LateTick,         Tick,  &[(Warn, Auto), (HoldMotion, Engage)],   false),
     rule(Flag::DriveFault,       Rig,   &[(QuickStop, Engage), (Disable, Restart)], true),
-    rule(Flag::StartCheck,       Rig,   &[(PassThrough, Engage)],                false),
+    rule(Flag::StartCheck,       Frame, &[(PassThrough, Engage)],                false),
     rule(Flag::WidthLimit,       Frame, WARN,                                    false),
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
     rule(Flag::CommandJump,      Tick,  &[(HoldMotion, Engage)],                 false),

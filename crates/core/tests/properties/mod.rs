@@ -39,6 +39,7 @@ mod reference_gate;
 mod reference_speed;
 mod section;
 mod slide;
+mod start_check;
 mod state;
 mod stress;
 mod strokes;

@@ -1,0 +1,101 @@
+//! Start check: a tip that moves against its command.
+
+/// Range of the command over which tip and command are compared, in `start_deviation`: twice the expected slack.
+const RANGE: f64 = 4.0;
+/// Least number of measurements.
+const LEAST: u32 = 50;
+/// Correlation from which on the direction is known: little else that moves a tip behind a wide slack reaches it.
+const CORRELATION: f64 = 0.8;
+
+/// Finds degrees of freedom whose tip moves against the command: the sign of a motor or of a sensor is wrong.
+///
+/// ```text
+/// r = cov(c, m) / (std(c) std(m)) < -0.8
+/// ```
+///
+/// of the command c and the measured tip m from the start on. The first time that |r| is larger, with enough measurements over
+/// a large enough range, decides, and the DOF is not checked again.
+///
+/// Wrong when something else moves the tip farther than its command does meanwhile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartCheck<const N: usize> {
+    range: [f64; N],
+    motions: [Motion; N],
+}
+
+impl<const N: usize> StartCheck<N> {
+    /// The check before the first measurement, for `start_deviation` (N,) [m or rad].
+    pub fn new(start_deviation: [f64; N]) -> Self {
+        Self {
+            range: start_deviation.map(|deviation| RANGE * deviation),
+            motions: [Motion::NONE; N],
+        }
+    }
+
+    /// Forgets all measurements.
+    pub const fn restart(&mut self) {
+        self.motions = [Motion::NONE; N];
+    }
+
+    /// Update with a measured tip and the command of its time (N,) [m or rad]; NaN for a DOF that was not measured. Whether one
+    /// moves against its command.
+    pub fn update(&mut self, command: [f64; N], tip: [f64; N]) -> bool {
+        let mut is_reversed = false;
+        let values = command.into_iter().zip(tip).zip(self.range);
+        for (motion, ((command, tip), range)) in self.motions.iter_mut().zip(values) {
+            if !motion.is_known && command.is_finite() && tip.is_finite() {
+                motion.add(command, tip, range);
+                is_reversed |= motion.is_known && motion.product < 0.0;
+            }
+        }
+        is_reversed
+    }
+}
+
+/// Sums over the measurements of a DOF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Motion {
+    count: u32,
+    /// Whether the direction is.
+    is_known: bool,
+    /// Of command and tip.
+    means: [f64; 2],
+    squares: [f64; 2],
+    product: f64,
+    /// Least and largest command.
+    ends: [f64; 2],
+}
+
+impl Motion {
+    const NONE: Self = Self {
+        count: 0,
+        is_known: false,
+        means: [0.0; 2],
+        squares: [0.0; 2],
+        product: 0.0,
+        ends: [f64::INFINITY, f64::NEG_INFINITY],
+    };
+
+    /// Adds a measurement (Welford 1962).
+    fn add(&mut self, command: f64, tip: f64, range: f64) {
+        let [least, largest] = self.ends;
+        self.ends = [least.min(command), largest.max(command)];
+        self.count = self.count.saturating_add(1);
+        let count = f64::from(self.count);
+        let mut left = [0.0; 2];
+        let sums = self.means.iter_mut().zip(&mut self.squares);
+        for ((mean, square), (left, value)) in sums.zip(left.iter_mut().zip([command, tip])) {
+            let away = value - *mean;
+            *mean += away / count;
+            *left = value - *mean;
+            *square += away * *left;
+        }
+        let [command, tip] = left;
+        self.product += command * tip * count / (count - 1.0).max(1.0);
+        let [least, largest] = self.ends;
+        let [command, tip] = self.squares;
+        self.is_known = self.count >= LEAST
+            && largest - least >= range
+            && self.product.abs() > CORRELATION * libm::sqrt(command * tip);
+    }
+}
