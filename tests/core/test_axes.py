@@ -96,7 +96,7 @@ def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[flo
 
 @pytest.mark.parametrize("profile", ["best", "paper"])
 def test_a_wrong_sign_of_one_sensor_ends_compensation(profile: Literal["best", "paper"]) -> None:
-    """The tip then follows as without it, in place of farther away; with `paper` at a difference."""
+    """The tip then follows as without it; with `paper` at a constant difference."""
     config, look = axes(2, width_limit=1.2).replace(profile=profile), on_tip(0.005)
 
     def reversed_look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
