@@ -41,7 +41,7 @@ def summary_line(dof: NamedDof, result: DofResult) -> str:
     line = f"{dof.label}: remaining slack {_shown(dof, result.compensated_estimate)}"
     if not math.isnan(result.uncompensated_estimate):
         reduction = result.reduction_estimate
-        percent = "-" if math.isnan(reduction) else f"{reduction:.0%}"
+        percent = "-" if math.isnan(reduction) else f"{reduction:z.0%}"
         line += f" of {_shown(dof, result.uncompensated_estimate)}, reduction {percent}"
     return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
 
@@ -51,7 +51,7 @@ def tracking_line(dof: NamedDof, result: OperatorResult, tip: str) -> str:
     line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
     if not math.isnan(result.reduction):
         before = _shown(dof, result.uncompensated_rms)
-        line += f", without compensation {before}, reduction {result.reduction:.0%}"
+        line += f", without compensation {before}, reduction {result.reduction:z.0%}"
     largest, slack = _shown(dof, result.largest), _shown(dof, result.slack)
     return f"{line}; largest {largest}; {tip}; slack found {slack}"
 
