@@ -267,6 +267,12 @@ def test_a_delay_is_within_the_history() -> None:
         config.replace(**{"measurement.delays": [0.0, 1.01 * longest]})
 
 
+def test_what_is_older_than_the_history_is_late() -> None:
+    with pytest.raises(ConfigError, match=r"safety\.frame_age: got 0\.3, expected at most control"):
+        Config().replace(**{"control.history": 0.25})
+    assert Config().replace(**{"control.history": 0.25, "safety.frame_age": 0.25})
+
+
 def test_an_empty_document_is_the_default() -> None:
     assert from_document({}) == Config()
 

@@ -117,6 +117,11 @@ fn errors_name_the_key() {
             "history: got 60, expected at most 1024 control periods",
         ),
         (dof("[control]\nhistory = 2e6"), "history: got 2000000"),
+        (
+            dof("[control]\nhistory = 0.2"),
+            "frame_age: got 0.3, expected at most control.history",
+        ),
+        (dof("[control]\nperiod = 0.1"), "stall: got 0.1"),
         (dof("range = [-inf, inf]"), "dof.range: got -inf"),
         (dof("[law]\ntip_gain = -1"), "tip_gain: got -1"),
         (dof("[control]\nperiod = 0"), "period: got 0"),

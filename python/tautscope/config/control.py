@@ -24,7 +24,7 @@ class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             1 <= self.history / self.period <= 1024,
             "history",
             self.history,
-            f"1 to 1024 ticks of period = {self.period}",
+            f"{self.period:g} to {1024 * self.period:g}, 1 to 1024 of control.period",
         )
 
 

@@ -87,9 +87,11 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         stall, least = self.safety.stall, 2 * self.control.period
         allowed = f"at least {least:g}, two of control.period: each tick would stop the motion"
         require(stall >= least, "safety.stall", stall, allowed)
-        for index, delay in enumerate(self.measurement.delays):
+        delays = enumerate(self.measurement.delays)
+        ages = {f"measurement.delays[{index}]": delay for index, delay in delays}
+        for key, age in (ages | {"safety.frame_age": self.safety.frame_age}).items():
             allowed = f"at most control.history = {self.control.history:g}"
-            require(delay <= self.control.history, f"measurement.delays[{index}]", delay, allowed)
+            require(age <= self.control.history, key, age, allowed)
         if self.actuators is not None:
             check_actuators(self.actuators, self.dof)
         if self.drives is not None:

@@ -3,7 +3,7 @@
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, zip_with};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, require};
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
@@ -51,6 +51,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         storage: S,
     ) -> Result<Self, ConfigError> {
         let control = &settings.control;
+        let age = settings.safety.frame_age;
+        let is_known = age <= control.history;
+        require(is_known, "frame_age", age, "at most control.history")?;
         let (friction, gain) = if P::IS_COUPLED {
             (settings.friction, [settings.law.free_gain; N])
         } else {
