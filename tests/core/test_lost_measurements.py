@@ -64,3 +64,28 @@ def test_the_log_says_once_why_nothing_is_compensated(
     lines = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
     assert len(lines) == (cause is not None)
     assert all("Compensation fades out" in line and str(cause) in line for line in lines)
+
+
+@pytest.mark.parametrize("others", [True, False], ids=["both", "each its own"])
+def test_a_sensor_may_be_lost_where_another_one_measures_the_same(others: bool) -> None:
+    """Of two degrees of freedom and two sensors one is lost for good: a warning, and compensation
+    goes on, if the other one measures both."""
+    config = from_document({"dof": [DOF, {**DOF, "name": "y"}]})
+    rig, loop = PlayRig(config, [4e-3, 4e-3]), HysteresisReduction(config)
+    sample, found = rig.reset(), []
+    while sample.time < END:
+        reference = 0.01 * np.sin(2 * np.pi * sample.time / CYCLE) * np.ones(2)
+        sample = rig.step(loop.step(reference, sample.time))
+        for tip in sample.measurement:
+            for sensor in (0, 1) if tip.captured_at < LOST else (1,):
+                own = np.where(np.arange(2) == sensor, tip.values, np.nan)
+                loop.on_tip(tip.values if others else own, tip.captured_at, sensor=sensor)
+        if sample.time > END - CYCLE:
+            found.append(sample.true_state - reference)
+    left, without = np.sqrt(np.mean(np.square(found), axis=0)), np.std(errors(False))
+    if others:
+        assert loop.supervision.flags == ("frame_rate",)
+        assert (left < 0.2 * without).all()
+    else:
+        assert loop.supervision.reaction == "fade"
+        np.testing.assert_allclose(left, without, rtol=0.02)

@@ -180,7 +180,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
     // The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,
-    // Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    // Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     TAUTSCOPE_FLAG_FRAME_RATE = 26,
 };
 #ifndef __cplusplus

@@ -345,6 +345,6 @@ pub enum TautscopeFlag {
     SlackChanged = 24,
     /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     GeometryOff = 25,
-    /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    /// Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     FrameRate = 26,
 }

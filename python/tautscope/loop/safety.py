@@ -35,7 +35,7 @@ REMEDIES: dict[str, str] = {
     "clock": "check the clock of the camera or sensor",
     "late": "check the load of this computer and the delay of the camera or sensor",
     "duplicate": "check the driver of the camera",
-    "frame_rate": "check the clock and the rate of the camera",
+    "frame_rate": "check the clock and the rate of camera and sensors",
     "swapped": "look in the image which band is which",
     "lost": "bring the bands into the image",
     "innovation": "look at the image, or check scale and zero of the sensor, and rest for a moment",

@@ -114,6 +114,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         // With an outlier nothing but the offset is learnt; of bands `merged` says so.
         let is_learnt = I::IS_WHOLE || !measurement.has_outlier;
         let determined = measurement.observable.map(|own| own && is_learnt);
+        self.monitors.determine(determined);
         let is_missing = self.is_missing(past.travel, determined);
         let is_missed = [is_missing || I::IS_WHOLE, is_missing];
         let (status, triggers) = self.accept(&past, &measurement, is_missed, raised);

@@ -87,7 +87,7 @@ flags! {
     SlackChanged = "slack_changed",
     /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
     GeometryOff = "geometry_off",
-    /// Images or measurements come at another rate than before: a clock is wrong, or the camera has changed.
+    /// Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     FrameRate = "frame_rate",
 }
 

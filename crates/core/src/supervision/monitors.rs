@@ -55,6 +55,9 @@ pub struct Monitors<const N: usize> {
     unit: [f64; N],
     off: Flags,
     time: f64,
+    /// When a measurement determined each DOF last, and the time without one after which sensors count as missing, in s.
+    determined_at: [f64; N],
+    gap: f64,
     /// Share of the compensation that the supervisor allows, as the law uses it, and that the operator has chosen.
     share: f64,
     chosen: f64,
@@ -90,6 +93,8 @@ impl<const N: usize> Monitors<N> {
             unit: safety.width_limit,
             off: safety.off,
             time: f64::NAN,
+            determined_at: [f64::NEG_INFINITY; N],
+            gap: safety.frame_gap,
             share: 1.0,
             chosen: 1.0,
         })
@@ -229,10 +234,27 @@ impl<const N: usize> Monitors<N> {
         dofs.any(|(travel, unit)| *travel > UNSEEN * unit)
     }
 
+    /// A measurement has determined some of the DOFs (N,).
+    pub(crate) fn determine(&mut self, determined: [bool; N]) {
+        let dofs = self.determined_at.iter_mut().zip(determined);
+        dofs.filter(|(_, is_new)| *is_new)
+            .for_each(|(at, _)| *at = self.time);
+    }
+
+    /// A sensor that is missing is only worth a warning while others determine every DOF.
     fn check_gap(&mut self, time: f64) -> Flags {
         let gates = self.frames.iter_mut();
         let found = gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)));
-        self.enabled(found)
+        let mut is_spared = !found.is_empty();
+        for at in &mut self.determined_at {
+            *at = at.min(time);
+            is_spared &= time - *at <= self.gap;
+        }
+        self.enabled(if is_spared {
+            Flags::of(Flag::FrameRate)
+        } else {
+            found
+        })
     }
 
     /// The flags of a set whose detectors are not switched off.

@@ -1,7 +1,8 @@
 //! Start check: a tip that moves against its command.
 
-/// Range of the command over which tip and command are compared, in `start_deviation`: twice the expected slack.
-const RANGE: f64 = 4.0;
+/// Standard deviation of the command from which on tip and command are compared, in `start_deviation`: that of a sine of more
+/// than twice the expected slack.
+const SPREAD: f64 = 1.5;
 /// Least number of measurements.
 const LEAST: u32 = 50;
 /// Correlation from which on the direction is known: little else that moves a tip behind a wide slack reaches it.
@@ -14,12 +15,12 @@ const CORRELATION: f64 = 0.8;
 /// ```
 ///
 /// of the command c and the measured tip m from the start on. The first time that |r| is larger, with enough measurements over
-/// a large enough range, decides, and the DOF is not checked again.
+/// enough motion, decides, and the DOF is not checked again.
 ///
 /// Wrong when something else moves the tip farther than its command does meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartCheck<const N: usize> {
-    range: [f64; N],
+    spread: [f64; N],
     motions: [Motion; N],
 }
 
@@ -27,7 +28,7 @@ impl<const N: usize> StartCheck<N> {
     /// The check before the first measurement, for `start_deviation` (N,) [m or rad].
     pub fn new(start_deviation: [f64; N]) -> Self {
         Self {
-            range: start_deviation.map(|deviation| RANGE * deviation),
+            spread: start_deviation.map(|deviation| SPREAD * deviation),
             motions: [Motion::NONE; N],
         }
     }
@@ -41,10 +42,10 @@ impl<const N: usize> StartCheck<N> {
     /// moves against its command.
     pub fn update(&mut self, command: [f64; N], tip: [f64; N]) -> bool {
         let mut is_reversed = false;
-        let values = command.into_iter().zip(tip).zip(self.range);
-        for (motion, ((command, tip), range)) in self.motions.iter_mut().zip(values) {
+        let values = command.into_iter().zip(tip).zip(self.spread);
+        for (motion, ((command, tip), spread)) in self.motions.iter_mut().zip(values) {
             if !motion.is_known && command.is_finite() && tip.is_finite() {
-                motion.add(command, tip, range);
+                motion.add(command, tip, spread);
                 is_reversed |= motion.is_known && motion.product < 0.0;
             }
         }
@@ -62,8 +63,6 @@ struct Motion {
     means: [f64; 2],
     squares: [f64; 2],
     product: f64,
-    /// Least and largest command.
-    ends: [f64; 2],
 }
 
 impl Motion {
@@ -73,13 +72,10 @@ impl Motion {
         means: [0.0; 2],
         squares: [0.0; 2],
         product: 0.0,
-        ends: [f64::INFINITY, f64::NEG_INFINITY],
     };
 
     /// Adds a measurement (Welford 1962).
-    fn add(&mut self, command: f64, tip: f64, range: f64) {
-        let [least, largest] = self.ends;
-        self.ends = [least.min(command), largest.max(command)];
+    fn add(&mut self, command: f64, tip: f64, spread: f64) {
         self.count = self.count.saturating_add(1);
         let count = f64::from(self.count);
         let mut left = [0.0; 2];
@@ -92,10 +88,9 @@ impl Motion {
         }
         let [command, tip] = left;
         self.product += command * tip * count / (count - 1.0).max(1.0);
-        let [least, largest] = self.ends;
         let [command, tip] = self.squares;
         self.is_known = self.count >= LEAST
-            && largest - least >= range
+            && command >= count * spread * spread
             && self.product.abs() > CORRELATION * libm::sqrt(command * tip);
     }
 }
