@@ -57,7 +57,7 @@ impl<const N: usize> StartCheck<N> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Motion {
     count: u32,
-    /// Whether the direction is.
+    /// Whether the direction is known.
     is_known: bool,
     /// Of command and tip.
     means: [f64; 2],
