@@ -102,9 +102,10 @@ def test_a_wrong_sign_of_one_sensor_ends_compensation(profile: Literal["best", "
     def reversed_look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
         return loop.on_tip(tip * [1, -1], at, np.eye(2) * 0.005**2)
 
-    off = operate(HysteresisReduction(config, compensate=False), Plays([0.6] * 2), look)
+    free = HysteresisReduction(config, compensate=False)
+    off = operate(free, Plays([0.6] * 2), look, amplitude=1.8)
     loop = HysteresisReduction(config)
-    left = operate(loop, Plays([0.6] * 2), reversed_look)
+    left = operate(loop, Plays([0.6] * 2), reversed_look, amplitude=1.8)
     assert loop.supervision.reaction == "pass_through"
     assert "start_check" in loop.supervision.flags
     if profile == "best":

@@ -38,6 +38,19 @@ pub struct Prior<const N: usize, const G: usize> {
     pub geometry_covariance: SMatrix<f64, G, G>,
 }
 
+impl<const N: usize, const G: usize> Prior<N, G> {
+    /// A state (N,) that is known, and a geometry as configured.
+    pub fn at(state: [f64; N]) -> Self {
+        Self {
+            state: state.into(),
+            covariance: SMatrix::zeros(),
+            geometry: SVector::zeros(),
+            slope: SMatrix::zeros(),
+            geometry_covariance: SMatrix::zeros(),
+        }
+    }
+}
+
 /// Features (M,) with their covariance (M, M); those that are not `seen` may be NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observed<const M: usize> {

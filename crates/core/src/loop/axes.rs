@@ -115,6 +115,7 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
     for HysteresisReduction<P, S, (), N>
 {
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport {
+        self.check_start(reading);
         let identity = identity(reading.values);
         let outcome = self.update_by(reading, reading.captured_at, reading.sensor, identity);
         let Outcome {
@@ -123,12 +124,6 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
             seen,
             triggers,
         } = outcome;
-        if let (Some(past), Some(view)) = (past, seen) {
-            let measured = zip_with(view.state, view.observable, |value, is_known| {
-                if is_known { value } else { f64::NAN }
-            });
-            self.monitors.check_start(past.command, measured);
-        }
         let predicted_state = past.map_or([f64::NAN; N], |past| past.predicted_state);
         let unseen = || View {
             state: predicted_state,
@@ -147,6 +142,31 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
             predicted: view.predicted,
             innovation: view.innovation,
             triggers: padded(triggers, Triggers::default()),
+        }
+    }
+}
+
+impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
+    HysteresisReduction<P, S, (), N>
+{
+    /// Compares the command with the tip by a measurement alone, whether it is used or refused, until the direction is known.
+    fn check_start(&mut self, reading: &Reading<'_>) {
+        let Some(spread) = self.monitors.unknown_direction() else {
+            return;
+        };
+        let Some(past) = self.history.at(reading.captured_at) else {
+            return;
+        };
+        let alone = Prior::at(past.predicted_state);
+        let observed = reading.observed();
+        let rows = observed.linearize(reading, &alone, observed.seen, &[0.0; N]);
+        let found = rows.map(compressed).and_then(|rows| {
+            let observable = determined(&rows.by_state, spread);
+            let (state, std) = least_squares(&rows, past.predicted_state, observable)?;
+            Some(zip_with(state, std, |state, std| state + 0.0 * std))
+        });
+        if let Some(measured) = found {
+            self.monitors.check_start(past.command, measured);
         }
     }
 }
@@ -234,13 +254,7 @@ impl<const N: usize> SensorProfile<N> for Paper<N, StateFromSensor<N>> {
         past: &Entry<N>,
     ) -> Option<(Measurement<N, Self::Evidence>, View<N>)> {
         let predicted = self.prior(past);
-        let prior = Prior {
-            state: predicted.state.into(),
-            covariance: SMatrix::zeros(),
-            geometry: SVector::zeros(),
-            slope: SMatrix::zeros(),
-            geometry_covariance: SMatrix::zeros(),
-        };
+        let prior = Prior::at(predicted.state);
         let observed = reading.observed();
         let rows = compressed(observed.linearize(reading, &prior, observed.seen, &[0.0; N])?);
         let observable = determined(&rows.by_state, self.estimation.unit);

@@ -281,6 +281,11 @@ impl<const N: usize> Monitors<N> {
         self.enabled(flags)
     }
 
+    /// The least standard deviations (N,) [m or rad] of the command that tell the directions; None once they are known.
+    pub(crate) fn unknown_direction(&self) -> Option<[f64; N]> {
+        self.start.unknown()
+    }
+
     /// Check whether the measured tip (N,) [m or rad] moves as the command of its time does.
     pub(crate) fn check_start(&mut self, command: [f64; N], measured: [f64; N]) {
         if self.start.update(command, measured) {

@@ -14,8 +14,8 @@ const CORRELATION: f64 = 0.8;
 /// r = cov(c, m) / (std(c) std(m)) < -0.8
 /// ```
 ///
-/// of the command c and the measured tip m from the start on. The first time that |r| is larger, with enough measurements over
-/// enough motion, decides, and the DOF is not checked again.
+/// of the command c and the tip m by each measurement alone, used or refused, from the start on. The first time that |r| is
+/// larger, with enough measurements over enough motion, decides, and the DOF is not checked again.
 ///
 /// Wrong when something else moves the tip farther than its command does meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +31,12 @@ impl<const N: usize> StartCheck<N> {
             spread: start_deviation.map(|deviation| SPREAD * deviation),
             motions: [Motion::NONE; N],
         }
+    }
+
+    /// The least standard deviations of the command (N,) [m or rad]; None where all directions are known.
+    pub fn unknown(&self) -> Option<[f64; N]> {
+        let is_open = self.motions.iter().any(|motion| !motion.is_known);
+        is_open.then_some(self.spread)
     }
 
     /// Forgets all measurements.
