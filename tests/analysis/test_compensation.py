@@ -12,6 +12,7 @@ from tautscope.analysis.compensator import compensator
 from tautscope.analysis.models.constant_play import operator
 from tautscope.analysis.slide import slide
 from tautscope.analysis.verdict import judge
+from tautscope.config import from_document
 from tautscope.errors import RecordError
 from tautscope.runs.records import Cleaning, Record, read_record
 from test_findings import judged
@@ -100,6 +101,17 @@ def test_a_slow_sensor_is_not_taken_for_a_silent_one() -> None:
     assert "safety" not in compensator({"tip": (repeated(1), verdict.found)})
     assert verdict.compensation is not None
     assert verdict.compensation.after < 0.3 * verdict.compensation.before
+
+
+def test_a_loop_of_a_tip_that_is_very_late_can_be_loaded() -> None:
+    """Its measurements may be no older than the history."""
+    record, found = judged("delay and play", 1).record, judged("delay and play", 1).found
+    assert record.time is not None
+    slow = replace(record, time=11 * record.time)
+    late = replace(found, delay=replace(found.delay, value=1.65))
+    config = from_document(compensator({"tip": (slow, late)}))
+    assert config.measurement.delays[0] == pytest.approx(1.65, rel=0.02)
+    assert config.safety.frame_age == config.control.history
 
 
 def test_a_long_record_with_few_tips_is_simulated_whole() -> None:

@@ -94,6 +94,29 @@ def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[flo
     np.testing.assert_allclose(2 * found.half_width, widths, rtol=0.25)
 
 
+@pytest.mark.parametrize(
+    ("start", "width"),
+    [(0.25, 0.5), (-0.25, 0.5), (0.0, 1.0)],
+    ids=["lag", "lead", "twice as wide"],
+)
+def test_a_start_off_the_middle_and_twice_the_expected_slack_are_learned(
+    start: float, width: float
+) -> None:
+    """After a minute no more is left than from the middle of the expected slack."""
+    config, errors = axes(1, width_limit=2.0, expected_width=0.5, speed=2.0), []
+    loop, tip = HysteresisReduction(config), start
+    for tick in range(round(90 / PERIOD)):
+        time = tick * PERIOD
+        reference = 1.5 * np.sin(0.9 * time)
+        command = float(loop.step([reference], time)[0])
+        tip = min(max(tip, command - width / 2), command + width / 2)
+        if tick % 5 == 0:
+            loop.on_tip([tip], time)
+        if time > 60:
+            errors.append(tip - reference)
+    assert np.std(errors) < 0.06 * width / 2
+
+
 @pytest.mark.parametrize("profile", ["best", "paper"])
 def test_a_wrong_sign_of_one_sensor_ends_compensation(profile: Literal["best", "paper"]) -> None:
     """The tip then follows as without it; with `paper` at a constant difference."""

@@ -83,8 +83,8 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     Args:
         parts: Name of a degree of freedom -> its record, and what was identified.
     """
-    dofs, noises, delays, usual_gap = [], [], [], Config().safety.frame_gap
-    gap = usual_gap
+    usual, dofs, noises, delays = Config(), [], [], []
+    gap = usual.safety.frame_gap
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
         scale = scale_of(record)
@@ -117,10 +117,11 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         "measurement": {"tip_deviation": max(1e-3, *noises)},
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
-    safety = {"frame_gap": gap} if gap > usual_gap else {}
+    safety = {"frame_gap": gap} if gap > usual.safety.frame_gap else {}
     if any(delays):
         document["measurement"]["delays"] = [float(np.mean(delays))]
-        safety["frame_age"] = max(0.3, 1.5 * max(delays))
+        age = max(usual.safety.frame_age, 1.5 * max(delays))
+        safety["frame_age"] = min(age, usual.control.history)
     if safety:
         document["safety"] = safety
     return {name: _rounded(section) for name, section in document.items()}

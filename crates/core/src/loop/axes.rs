@@ -163,7 +163,9 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
         let found = rows.map(compressed).and_then(|rows| {
             let observable = determined(&rows.by_state, spread);
             let (state, std) = least_squares(&rows, past.predicted_state, observable)?;
-            Some(zip_with(state, std, |state, std| state + 0.0 * std))
+            // Without a standard deviation it is not determined.
+            let known = |state, std: f64| if std.is_finite() { state } else { f64::NAN };
+            Some(zip_with(state, std, known))
         });
         if let Some(measured) = found {
             self.monitors.check_start(past.command, measured);

@@ -56,7 +56,7 @@ pub struct Monitors<const N: usize> {
     off: Flags,
     time: f64,
     /// When a measurement determined each DOF last, and the time without one after which sensors count as missing, in s.
-    determined_at: [f64; N],
+    last_determined: [f64; N],
     gap: f64,
     /// Share of the compensation that the supervisor allows, as the law uses it, and that the operator has chosen.
     share: f64,
@@ -93,7 +93,7 @@ impl<const N: usize> Monitors<N> {
             unit: safety.width_limit,
             off: safety.off,
             time: f64::NAN,
-            determined_at: [f64::NEG_INFINITY; N],
+            last_determined: [f64::NEG_INFINITY; N],
             gap: safety.frame_gap,
             share: 1.0,
             chosen: 1.0,
@@ -236,7 +236,7 @@ impl<const N: usize> Monitors<N> {
 
     /// A measurement has determined some of the DOFs (N,).
     pub(crate) fn determine(&mut self, determined: [bool; N]) {
-        let dofs = self.determined_at.iter_mut().zip(determined);
+        let dofs = self.last_determined.iter_mut().zip(determined);
         dofs.filter(|(_, is_new)| *is_new)
             .for_each(|(at, _)| *at = self.time);
     }
@@ -246,7 +246,7 @@ impl<const N: usize> Monitors<N> {
         let gates = self.frames.iter_mut();
         let found = gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)));
         let mut is_spared = !found.is_empty();
-        for at in &mut self.determined_at {
+        for at in &mut self.last_determined {
             *at = at.min(time);
             is_spared &= time - *at <= self.gap;
         }
