@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from axes import colonoscope
+from axes import colonoscope, start
 from axes.tracking import PLANTS, Job, bound, simulate, times
 from common.doc_pages import insert
 from common.paths import ROOT
@@ -99,6 +99,7 @@ def main() -> None:
     parser.add_argument(
         "--colonoscope", action="store_true", help="the simulated colonoscope in place of plays"
     )
+    parser.add_argument("--start", action="store_true", help="the first 40 s of 60 drawn plays")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     if options.colonoscope:
@@ -107,6 +108,21 @@ def main() -> None:
         text = colonoscope_table({job: ran[job] for job in both})
         if options.write:
             insert(ROOT / "docs" / "plants.md", "colonoscope", text)
+        print(text)
+        return
+    if options.start:
+        drawn = range(options.first_seed, options.first_seed + start.DRAWS)
+        wanted: list[start.Job] = [
+            (what, zero, seed)
+            for what in ("none", *start.PROFILES)
+            for zero in start.ZEROS
+            for seed in drawn
+        ]
+        spread = dict(run_parallel(start.simulate, wanted, options.workers, options.scheduler))
+        text = start.table({job: spread[job] for job in wanted})
+        if options.write:
+            head = f"Seeds {drawn[0]} to {drawn[-1]}; median, 10th percentile.\n\n"
+            insert(ROOT / "docs" / "plants.md", "start", head + text)
         print(text)
         return
     counts = [options.dofs] if options.dofs else COUNTS

@@ -94,27 +94,39 @@ def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[flo
     np.testing.assert_allclose(2 * found.half_width, widths, rtol=0.25)
 
 
-@pytest.mark.parametrize(
-    ("start", "width"),
-    [(0.25, 0.5), (-0.25, 0.5), (0.0, 1.0)],
-    ids=["lag", "lead", "twice as wide"],
-)
-def test_a_start_off_the_middle_and_twice_the_expected_slack_are_learned(
-    start: float, width: float
-) -> None:
-    """After a minute no more is left than from the middle of the expected slack."""
-    config, errors = axes(1, width_limit=2.0, expected_width=0.5, speed=2.0), []
-    loop, tip = HysteresisReduction(config), start
-    for tick in range(round(90 / PERIOD)):
+def sine_errors(widths: Floats, tip: Floats, zero: float, seconds: float) -> Floats:
+    """Tip less reference of two axes from tips at the start, by a sensor whose zero is elsewhere.
+
+    The second axis rests for the first 8 s.
+    """
+    config, errors = axes(2, width_limit=2.0, expected_width=0.5, speed=2.0), []
+    loop = HysteresisReduction(config)
+    for tick in range(round(seconds / PERIOD)):
         time = tick * PERIOD
-        reference = 1.5 * np.sin(0.9 * time)
-        command = float(loop.step([reference], time)[0])
-        tip = min(max(tip, command - width / 2), command + width / 2)
+        reference = 1.5 * np.sin(0.9 * np.maximum([time, time - 8.0], 0.0))
+        command = loop.step(reference, time)
+        tip = np.clip(tip, command - widths / 2, command + widths / 2)
         if tick % 5 == 0:
-            loop.on_tip([tip], time)
-        if time > 60:
-            errors.append(tip - reference)
-    assert np.std(errors) < 0.06 * width / 2
+            loop.on_tip(tip + zero, time)
+        errors.append(tip - reference)
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.125])
+@pytest.mark.parametrize("start", [0.25, -0.25], ids=["lag", "lead"])
+def test_a_start_at_an_end_of_the_slack_costs_the_first_seconds(start: float, zero: float) -> None:
+    """Also of an axis that begins later, and with a zero of the sensor a quarter of it off."""
+    widths = np.full(2, 0.5)
+    errors = sine_errors(widths, np.full(2, start), zero, 28.0)
+    for axis, begins in enumerate((0.0, 8.0)):
+        settled = errors[round((begins + 10.0) / PERIOD) : round((begins + 20.0) / PERIOD), axis]
+        assert np.std(settled) < 0.12 * widths[axis] / 2
+
+
+def test_twice_the_expected_slack_is_learned() -> None:
+    """After a minute no more is left than of the expected slack."""
+    errors = sine_errors(np.full(2, 1.0), np.zeros(2), 0.0, 90.0)
+    assert np.std(errors[round(60 / PERIOD) :], axis=0).max() < 0.06 * 0.5
 
 
 @pytest.mark.parametrize("profile", ["best", "paper"])

@@ -8,7 +8,7 @@ use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, GAIN_ROW, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission,
+    COEFFICIENTS, GAIN_ROW, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission, product,
 };
 use crate::model::slack::{GAINS, Slack};
 
@@ -25,6 +25,8 @@ const GAIN_DEVIATION: f64 = 0.3;
 const RECENT: f64 = 8.0;
 /// Travel in units between two images from which on their errors are independent: images of a still scene err alike.
 const STILL: f64 = 0.02;
+/// Travel of the command of a DOF in units from which on its plays no longer depend on where in the slack the motion began.
+const START: f64 = 1.5;
 /// Least share of its information that an image has.
 const LEAST: f64 = 0.001;
 
@@ -52,6 +54,7 @@ pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     travel: f64,
     /// Travel since the last update.
     moved: f64,
+    start: [Start; N],
     /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
     pub ratio: f64,
 }
@@ -63,6 +66,17 @@ pub struct GeometryPrior {
     pub std: f64,
     /// Travel in units.
     pub travel: f64,
+}
+
+/// The beginning of the motion of a DOF, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Start {
+    /// Standard deviation of the tip.
+    std: f64,
+    /// Travel after which the plays are known.
+    left: f64,
+    /// Command at the last measurement.
+    command: f64,
 }
 
 /// Standard deviations of the slack of a DOF, in its unit.
@@ -104,10 +118,17 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         for index in 0..N {
             kalman.know_sum(&of_dof(index, &GAIN_ROW), GAIN_DEVIATION);
         }
-        for (index, (start, unit)) in start_std.into_iter().zip(transmission.unit()).enumerate() {
+        for start in start_std {
             require_positive("start_deviation", start)?;
-            let start = start / unit;
-            kalman.add_variance(index * COEFFICIENTS + OFFSET, start * start);
+        }
+        let start = zip_with(start_std, transmission.unit(), |start, unit| start / unit);
+        let start = start.map(|std| Start {
+            std,
+            left: if G == 0 { START } else { 0.0 },
+            command: 0.0,
+        });
+        for (index, start) in start.iter().enumerate() {
+            kalman.add_variance(index * COEFFICIENTS + OFFSET, start.std * start.std);
         }
         Ok(Self {
             transmission,
@@ -117,6 +138,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             memory: geometry.map(|own| own.travel),
             travel: 0.0,
             moved: STILL,
+            start,
             ratio: 1.0,
         })
     }
@@ -212,7 +234,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Updates the coefficients with a linear measurement at plays; with `is_position_only` the offsets alone.
     ///
     /// A measurement whose squared Mahalanobis `distance` is above the M that are expected has a variance larger by as much
-    /// (Birge's ratio). So has one of a scene that has hardly moved since the last update.
+    /// (Birge's ratio). So has one of a scene that has hardly moved since the last update. Until a DOF has moved by `START`, it
+    /// updates the offset alone, which afterwards is as uncertain as before.
     pub fn update<const M: usize>(
         &mut self,
         plays: &Plays<N>,
@@ -225,7 +248,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             offsets::<N, D>(&mut only).for_each(|entry| *entry = 1.0);
         }
         let only = is_position_only.then_some(&only);
-        let regressors = self.rows(plays);
+        let mut regressors = self.rows(plays);
+        let known = self.start(plays, &mut regressors);
         let (mut rows, mut cross) = (
             SMatrix::<f64, D, M>::zeros(),
             self.crosses(&regressors) * measurement.by_state.transpose(),
@@ -247,7 +271,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         self.ratio += (variance - self.ratio) / RECENT;
         let variance = variance / (self.moved / STILL).clamp(LEAST, 1.0);
         self.moved = 0.0;
-        let value = measurement.value - measurement.by_state * SVector::from(self.origin);
+        let known = zip_with(self.origin, known, |origin, known| origin + known);
+        let value = measurement.value - measurement.by_state * SVector::from(known);
         self.kalman.update(&rows, &cross, &value, variance, only);
         self.bound_gains();
     }
@@ -320,6 +345,32 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             }
         }
         rows
+    }
+
+    /// What the plays add to the tip (N,) [m or rad] of DOFs that have hardly moved yet, without these plays in their `rows`.
+    ///
+    /// A motion seldom begins in the middle of the slack.
+    fn start(&mut self, plays: &Plays<N>, rows: &mut [Row; N]) -> [f64; N] {
+        let mut known = [0.0; N];
+        let means = self.coefficients();
+        let dofs = self.start.iter_mut().zip(plays.command).zip(rows);
+        let dofs = dofs.zip(means).zip(&mut known).enumerate();
+        for (index, ((((start, command), row), mean), known)) in dofs {
+            if start.left <= 0.0 {
+                continue;
+            }
+            start.left -= (command - start.command).abs();
+            start.command = command;
+            if start.left <= 0.0 {
+                let offset = index * COEFFICIENTS + OFFSET;
+                self.kalman.add_variance(offset, start.std * start.std);
+                continue;
+            }
+            let (weights, _) = row.split_at_mut(OFFSET);
+            *known = product(weights, &mean);
+            weights.fill(0.0);
+        }
+        known
     }
 
     /// Moves the means to the nearest ones, in the metric of their covariance, whose gains are within [`GAINS`].
