@@ -23,7 +23,7 @@ class Plant(PlayRig):
     """One degree of freedom, mostly at an end of its slack, which the seed draws as the rest.
 
     Slack, ideal or rounded, of 0.5 to 1.5 times the expected, gain 0.8 to 1.1, noise of up to 0.01
-    rad of the sensor, 20 to 150 ms late, motion of 0.3 to 3 rad.
+    rad of the sensor, 20 to 150 ms late, motion of 0.3 to 1.5 rad.
     """
 
     def __init__(self, job: Job) -> None:
@@ -32,7 +32,7 @@ class Plant(PlayRig):
         width = EXPECTED * rng.uniform(0.5, 1.5)
         self._start = rng.choice([-1.0, -1.0, 1.0, 1.0, rng.uniform(-1, 1)])
         self.motion = OperatorMotion(
-            [Sine(centre=0.0, amplitude=rng.choice([0.3, 0.75, 1.5, 3.0]))], seed, PARTS[-1][1]
+            [Sine(centre=0.0, amplitude=rng.choice([0.3, 0.75, 1.5]))], seed, PARTS[-1][1]
         )
         radii = [(1.0,), (0.5, 0.75, 1.0, 1.25, 1.5)][rng.integers(2)]
         config = axes(1, width_limit=1.0, expected_width=EXPECTED)

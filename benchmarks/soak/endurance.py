@@ -118,13 +118,15 @@ def _resident() -> int:
 
 
 def table(sessions: list[Session]) -> str:
-    """Return a Markdown table, a line per session."""
+    """Return a Markdown table, a line for the first two and the last session."""
     labels = " | ".join(f"{dof.label} [{dof.display_unit}]" for dof in Dof)
     lines = [
         f"| session | {labels} | tick [us] | memory [MB] | files | threads | ticks lost |",
         "|--:|" + "--:|" * 8,
     ]
     for number, each in enumerate(sessions, 1):
+        if 2 < number < len(sessions):
+            continue
         cells = [
             str(number),
             *(f"{dof.display_scale * each.error[dof]:.3f}" for dof in Dof),

@@ -114,6 +114,13 @@ def test_a_loop_of_a_tip_that_is_very_late_can_be_loaded() -> None:
     assert config.safety.frame_age == config.control.history
 
 
+def test_a_loop_of_a_tip_whose_noise_is_larger_than_its_slack_can_be_loaded() -> None:
+    record, found = judged("play", 3).record, judged("play", 3).found
+    noisy = replace(found, noise=2 * found.width.value)
+    config = from_document(compensator({"tip": (record, noisy)}))
+    assert config.measurement.tip_deviation == 0.3
+
+
 def test_a_long_record_with_few_tips_is_simulated_whole() -> None:
     record = repeated(10, every=12_000)
     found = judge(repeated(2)).found

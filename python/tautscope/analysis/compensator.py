@@ -22,6 +22,8 @@ CHANGE_RATE = 0.1
 GAP, LONGEST_GAP = 3.0, 5.0
 """Time without a tip after which the sensor counts as silent: in intervals of the record, and at
 most [s]."""
+MOST_NOISE = 0.3
+"""Largest noise of the tip, over its width limit, that a configuration may state."""
 UNNAMED = 1e-3
 """Metres per unit of a tip whose unit the file does not name, or a thousandth of it, and so on."""
 _LARGEST = {"m": 1.0, "rad": 100.0, "": 0.1}
@@ -114,7 +116,7 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     document: dict[str, Any] = {
         "dof": dofs,
         "law": {"change_rate": CHANGE_RATE},
-        "measurement": {"tip_deviation": max(1e-3, *noises)},
+        "measurement": {"tip_deviation": min(max(1e-3, *noises), MOST_NOISE)},
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
     safety = {"frame_gap": gap} if gap > usual.safety.frame_gap else {}
