@@ -255,8 +255,8 @@ fn ticks() -> u32 {
 }
 
 /// RMS error of a compensated tip in tenths of a run, in units.
-fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 10] {
-    let (mut truth, mut random) = (Truth::new(half, centre, 1.0), Random(2013));
+fn soak(truth: Truth, ticks: u32, mut reference: impl FnMut(u32) -> f64) -> [f64; 10] {
+    let (mut truth, mut random) = (truth, Random(2013));
     let mut direct = Direct::new();
     let bounds = Bounds {
         width_limit: [2.0 * UNIT],
@@ -267,8 +267,8 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
     };
     let own = settings(&safety()).law;
     let mut law = VectorLaw::new(own, direct.estimate.transmission, &bounds).unwrap();
-    let (mut errors, tenth) = ([0.0; 10], ticks() / 10);
-    for tick in 0..ticks() {
+    let (mut errors, tenth) = ([0.0; 10], ticks / 10);
+    for tick in 0..ticks {
         let to = ORIGIN + UNIT * reference(tick);
         let rows = direct.estimate.coefficients();
         let command = law.propose([to], &rows, 1.0);
@@ -289,11 +289,25 @@ fn check_soak(errors: [f64; 10]) {
     assert!(errors[9] <= 1.15 * errors[1], "{errors:?}");
 }
 
+/// As from its middle: after half a stroke it does not matter any more.
+#[test]
+fn a_start_at_an_end_of_the_slack_does_not_last() {
+    for side in [-1.0, 1.0] {
+        let mut truth = Truth::new(0.6, 0.0, 1.0);
+        truth.state.output = 0.6 * side * UNIT;
+        let errors = soak(truth, 4000, |tick| 4.0 * (0.0045 * f64::from(tick)).sin());
+        assert!(
+            errors[4..].iter().all(|error| *error < 0.06),
+            "{errors:.3?}"
+        );
+    }
+}
+
 /// Strokes shorter than the slack excite few directions of the coefficients; the others may not drift.
 #[test]
 fn short_strokes_do_not_let_the_estimate_drift() {
     for (half, centre, amplitude) in [(0.8, 0.15, 0.6), (0.55, -0.1, 0.25)] {
-        check_soak(soak(half, centre, |tick| {
+        check_soak(soak(Truth::new(half, centre, 1.0), ticks(), |tick| {
             amplitude * (0.02 * f64::from(tick)).sin()
         }));
     }
@@ -302,7 +316,7 @@ fn short_strokes_do_not_let_the_estimate_drift() {
 #[test]
 fn short_moves_to_random_targets_do_not_let_the_estimate_drift() {
     let (mut random, mut at, mut target) = (Random(7), 0.0, 0.0_f64);
-    check_soak(soak(0.8, 0.15, |_| {
+    check_soak(soak(Truth::new(0.8, 0.15, 1.0), ticks(), |_| {
         if at == target {
             target = random.within(-0.6, 0.6);
         }
