@@ -94,10 +94,12 @@ def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[flo
     np.testing.assert_allclose(2 * found.half_width, widths, rtol=0.25)
 
 
-def sine_errors(widths: Floats, tip: Floats, zero: float, seconds: float) -> Floats:
-    """Tip less reference of two axes from tips at the start, by a sensor whose zero is elsewhere.
+def sine_errors(
+    widths: Floats, tip: Floats, zero: float, seconds: float
+) -> tuple[Floats, tuple[str, ...]]:
+    """Tip less reference, and flags, of two axes by a sensor whose zero is elsewhere.
 
-    The second axis rests for the first 8 s.
+    They begin at `tip`; the second axis rests for the first 8 s.
     """
     config, errors = axes(2, width_limit=2.0, expected_width=0.5, speed=2.0), []
     loop = HysteresisReduction(config)
@@ -109,7 +111,7 @@ def sine_errors(widths: Floats, tip: Floats, zero: float, seconds: float) -> Flo
         if tick % 5 == 0:
             loop.on_tip(tip + zero, time)
         errors.append(tip - reference)
-    return np.array(errors)
+    return np.array(errors), loop.supervision.latched
 
 
 @pytest.mark.parametrize("zero", [0.0, 0.125])
@@ -117,7 +119,8 @@ def sine_errors(widths: Floats, tip: Floats, zero: float, seconds: float) -> Flo
 def test_a_start_at_an_end_of_the_slack_costs_the_first_seconds(start: float, zero: float) -> None:
     """Also of an axis that begins later, and with a zero of the sensor a quarter of it off."""
     widths = np.full(2, 0.5)
-    errors = sine_errors(widths, np.full(2, start), zero, 28.0)
+    errors, flags = sine_errors(widths, np.full(2, start), zero, 28.0)
+    assert flags == ()
     for axis, begins in enumerate((0.0, 8.0)):
         settled = errors[round((begins + 10.0) / PERIOD) : round((begins + 20.0) / PERIOD), axis]
         assert np.std(settled) < 0.12 * widths[axis] / 2
@@ -125,7 +128,7 @@ def test_a_start_at_an_end_of_the_slack_costs_the_first_seconds(start: float, ze
 
 def test_twice_the_expected_slack_is_learned() -> None:
     """After a minute no more is left than of the expected slack."""
-    errors = sine_errors(np.full(2, 1.0), np.zeros(2), 0.0, 90.0)
+    errors, _ = sine_errors(np.full(2, 1.0), np.zeros(2), 0.0, 90.0)
     assert np.std(errors[round(60 / PERIOD) :], axis=0).max() < 0.06 * 0.5
 
 

@@ -277,6 +277,16 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         self.bound_gains();
     }
 
+    /// A tip (N,) [m or rad] without the DOFs of which it is not known where in the slack they began.
+    pub fn after_start(&self, tip: [f64; N]) -> [f64; N] {
+        let left = self.start.each_ref().map(|start| start.left);
+        zip_with(
+            tip,
+            left,
+            |tip, left| if left > 0.0 { f64::NAN } else { tip },
+        )
+    }
+
     /// Makes the offset of every tip less certain by standard deviations (N,) [m or rad].
     pub fn loosen(&mut self, std: [f64; N]) {
         for (index, (std, unit)) in std.into_iter().zip(self.transmission.unit()).enumerate() {

@@ -181,7 +181,7 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
         }
         self.rows = self.estimate.coefficients();
         self.slack = self.estimate.slack();
-        let measured = measurement.state;
+        let measured = self.estimate.after_start(measurement.state);
         let (time, predicted) = (past.time, past.predicted_state);
         let has_changed = self.prediction.update(time, predicted, measured);
         let raised = Flags::when(self.law.is_limited, Flag::WidthLimit)
