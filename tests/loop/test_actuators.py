@@ -195,7 +195,8 @@ def test_the_loop_knows_what_was_commanded_within_the_limits(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """What is not commanded is no slack, and the warnings name whose it is."""
-    robot = axes(2, names=["bend_x", "bend_y"], width_limit=1.0)
+    names, widths = ["bend_x", "bend_y"], [0.5, 0.3]
+    robot = axes(2, names=names, width_limit=1.0, expected_width=widths)
     limits = [[-1.8, 1.8], [-4, 4], [-3, 3]]
     robot = robot.replace(actuators={"matrix": [[3, 0], [0, 2], [-1, 1]], "limits": limits})
     reports: list[Report] = []
@@ -209,12 +210,12 @@ def test_the_loop_knows_what_was_commanded_within_the_limits(
             reports.append(report)
 
     motion = OperatorMotion([Sine(centre=0, amplitude=1), Sine(centre=0, amplitude=0.8)], 3, 30.0)
-    run = run_experiment(PlayRig(robot, [0.5, 0.3]), motion, robot, log=Log())  # type: ignore[arg-type]
+    run = run_experiment(PlayRig(robot, widths), motion, robot, log=Log())  # type: ignore[arg-type]
     (record,) = caplog.records
     assert record.getMessage().startswith("bend_x: limited by actuators.limits; the command needs")
     assert abs(run.trace["command_bend_x"]).max() == pytest.approx(0.6)
     assert abs(run.trace["reference_bend_x"]).max() > 0.7
-    for name, slack in (("bend_x", 0.5), ("bend_y", 0.3)):
+    for name, slack in zip(names, widths, strict=True):
         command, applied = (run.trace[f"{of}_{name}"] for of in ("command", "applied"))
         np.testing.assert_allclose(applied[1:], command[:-1], atol=1e-12)
         found = run.trace[f"delta_plus_{name}"][-1] - run.trace[f"delta_minus_{name}"][-1]
