@@ -54,6 +54,7 @@ pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     travel: f64,
     /// Travel since the last update.
     moved: f64,
+    /// The beginning of the motion of each DOF.
     start: [Start; N],
     /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
     pub ratio: f64,
@@ -234,8 +235,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Updates the coefficients with a linear measurement at plays; with `is_position_only` the offsets alone.
     ///
     /// A measurement whose squared Mahalanobis `distance` is above the M that are expected has a variance larger by as much
-    /// (Birge's ratio). So has one of a scene that has hardly moved since the last update. Until a DOF has moved by `START`, it
-    /// updates the offset alone, which afterwards is as uncertain as before.
+    /// (Birge's ratio). So has one of a scene that has hardly moved since the last update. Where no geometry is estimated, it
+    /// updates the offset of a DOF alone until this has moved by `START`; then the offset is as uncertain as before.
     pub fn update<const M: usize>(
         &mut self,
         plays: &Plays<N>,
@@ -249,7 +250,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         }
         let only = is_position_only.then_some(&only);
         let mut regressors = self.rows(plays);
-        let known = self.start(plays, &mut regressors);
+        let known = self.hold_weights_at_start(plays, &mut regressors);
         let (mut rows, mut cross) = (
             SMatrix::<f64, D, M>::zeros(),
             self.crosses(&regressors) * measurement.by_state.transpose(),
@@ -360,7 +361,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// What the plays add to the tip (N,) [m or rad] of DOFs that have hardly moved yet, without these plays in their `rows`.
     ///
     /// A motion seldom begins in the middle of the slack.
-    fn start(&mut self, plays: &Plays<N>, rows: &mut [Row; N]) -> [f64; N] {
+    fn hold_weights_at_start(&mut self, plays: &Plays<N>, rows: &mut [Row; N]) -> [f64; N] {
         let mut known = [0.0; N];
         let means = self.coefficients();
         let dofs = self.start.iter_mut().zip(plays.command).zip(rows);
