@@ -12,6 +12,7 @@ PARTS = ((0.0, 10.0), (10.0, 20.0), (20.0, 40.0))
 ZEROS = (0.0, 0.3, 1.0)
 """Standard deviations of the sensor's zero, in expected half widths."""
 DRAWS = 60
+"""Number of seeds."""
 PROFILES = ("paper", "best")
 EXPECTED = 0.5
 """Expected width of the slack [rad]."""
@@ -38,7 +39,7 @@ class Plant(PlayRig):
         config = axes(1, width_limit=1.0, expected_width=EXPECTED)
         super().__init__(
             config.replace(
-                **{"profile": "best" if profile == "none" else profile},
+                profile="best" if profile == "none" else profile,
                 **{"measurement.tip_deviation": rng.uniform(0.001, 0.01)},
             ),
             np.outer([width], radii),

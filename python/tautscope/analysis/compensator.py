@@ -11,6 +11,7 @@ import numpy as np
 from tautscope._core import MOST_RANGE
 from tautscope.analysis.identification import Identification
 from tautscope.config import Config
+from tautscope.config.fields import MOST_RATIO
 from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
@@ -22,8 +23,6 @@ CHANGE_RATE = 0.1
 GAP, LONGEST_GAP = 3.0, 5.0
 """Time without a tip after which the sensor counts as silent: in intervals of the record, and at
 most [s]."""
-MOST_NOISE = 0.3
-"""Largest noise of the tip, over its width limit, that a configuration may state."""
 UNNAMED = 1e-3
 """Metres per unit of a tip whose unit the file does not name, or a thousandth of it, and so on."""
 _LARGEST = {"m": 1.0, "rad": 100.0, "": 0.1}
@@ -113,10 +112,11 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         gains.append(1 / (scale * found.gain))
         offsets.append(-found.offset / found.gain)
         units.append(record.units[0])
+    noise = min(max(1e-3, *noises), MOST_RATIO * usual.measurement.tip_deviation)
     document: dict[str, Any] = {
         "dof": dofs,
         "law": {"change_rate": CHANGE_RATE},
-        "measurement": {"tip_deviation": min(max(1e-3, *noises), MOST_NOISE)},
+        "measurement": {"tip_deviation": noise},
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
     safety = {"frame_gap": gap} if gap > usual.safety.frame_gap else {}
