@@ -34,6 +34,7 @@ RESULTS: dict[str, Callable[[list[float]], None]] = {
     "own_detector": of_your_own_rig,
     "own_catheter": of_a_robot,
     "own_instrument": of_a_robot,
+    "own_mujoco": of_a_robot,
     "own_record": of_a_record,
 }
 
