@@ -44,6 +44,8 @@ def test_the_tip_follows_as_without_compensation(share: float) -> None:
     ("gap", "late", "ahead", "cause"),
     [
         (0.04, 0.0, 0.0, None),
+        (np.inf, 0.0, 0.0, "safety.frame_gap"),
+        (0.04, np.inf, 0.0, "safety.frame_gap"),
         (0.25, 0.0, 0.0, "safety.frame_gap"),
         (0.04, 0.4, 0.0, "frame_age"),
         (0.04, 0.0, 1e9, "clock of the camera or sensor"),

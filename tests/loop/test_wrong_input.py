@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tautscope import Config, HysteresisReduction, Sample, Tip, axes
 from tautscope.config import from_document
 from tautscope.errors import FieldError
 from tautscope.loop.rig import check_sample
+from tautscope.loop.signal_checks import check_covariance
 
 NAN, EYE = float("nan"), np.eye(3)
 
@@ -161,3 +163,9 @@ def test_a_time_may_be_any_number() -> None:
     found = HysteresisReduction(planes())
     for time in (np.int64(1), 2, np.float32(3.0), 4.0):
         found.step([0.0, 0.0], time)
+
+
+def test_a_covariance_that_was_turned_is_symmetric_up_to_rounding() -> None:
+    for turn in Rotation.random(50, rng=1).as_matrix():
+        turned = turn @ (1e-4 * np.eye(3)) @ turn.T
+        assert (check_covariance("covariance", turned, 3) == turned).all()

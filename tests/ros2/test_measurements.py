@@ -85,6 +85,12 @@ def test_the_covariance_about_fixed_axes_is_turned_to_the_axes_of_the_sensor() -
     np.testing.assert_allclose(np.abs(axes[:, 2] @ TURNED.inv().apply([1, 0, 0])), 1.0, rtol=1e-9)
 
 
+def test_a_covariance_that_is_equal_about_all_axes_stays_what_it_is() -> None:
+    variances = np.diag([9e-8] * 3 + [1e-4] * 3)
+    found = read("PoseWithCovarianceStamped", covariance=variances).covariance
+    np.testing.assert_allclose(found, variances, atol=1e-19)
+
+
 def test_joints_are_measured_by_their_names() -> None:
     reader = MeasurementReader(config("JointState"), 0, TOPIC)
 

@@ -259,16 +259,17 @@ fn signal(message: std::fmt::Arguments<'_>) -> TautscopeResult {
     failed(TautscopeResult::Signal, message)
 }
 
-/// Whether a matrix is symmetric and has a factor by Cholesky.
-fn is_covariance(matrix: &[f64], count: usize) -> bool {
+/// Whether a matrix is symmetric up to rounding, in standard deviations, and has a factor by Cholesky.
+pub(crate) fn is_covariance(matrix: &[f64], count: usize) -> bool {
     let mut factor = [[0.0; VALUES]; VALUES];
     for row in 0..count {
         for column in 0..=row {
             let (entry, mirrored) = (matrix[row * count + column], matrix[column * count + row]);
+            let scale = (matrix[row * (count + 1)] * matrix[column * (count + 1)]).sqrt();
             let pairs = factor[row].iter().zip(&factor[column]).take(column);
             let rest = entry - pairs.map(|(a, b)| a * b).sum::<f64>();
             let is_pivot = row == column;
-            let is_symmetric = (entry - mirrored).abs() <= 1e-6 * mirrored.abs();
+            let is_symmetric = (entry - mirrored).abs() <= 1e-6 * scale;
             if !is_symmetric || !rest.is_finite() || (is_pivot && rest <= 0.0) {
                 return false;
             }

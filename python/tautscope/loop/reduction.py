@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
+LOGGED_TICKS = 100
+"""After so many ticks each a log message says why nothing is compensated, unless it was said."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -219,6 +221,8 @@ class HysteresisReduction:
         made_at = None if made_at is None else check_time("made_at", made_at)
         self._ticks += 1
         self._limited = ()
+        if self._ticks % LOGGED_TICKS == 0:  # no report tells of measurements that do not come
+            self._log_reaction(time, self.supervision)
         return self._loop.step(
             values, time, made_at, None if self._actuators is None else self._within_limits
         )
@@ -513,6 +517,11 @@ class HysteresisReduction:
             _LOG.warning("%s: %s; the command needs %s", what, LIMITED, excess)
         return reached
 
+    def _log_reaction(self, time: float, now: Supervision) -> None:
+        if now.reaction.rank >= self._least_logged.rank and now.reaction not in self._logged:
+            self._logged.add(now.reaction)
+            _LOG.warning("at %.3f s: %s", time, now.effect)
+
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
             self.on_event(what)
@@ -534,9 +543,7 @@ class HysteresisReduction:
     ) -> Report:
         self.updates += 1
         now = self.supervision
-        if now.reaction.rank >= self._least_logged.rank and now.reaction not in self._logged:
-            self._logged.add(now.reaction)
-            _LOG.warning("at %.3f s: %s", captured_at, now.effect)
+        self._log_reaction(captured_at, now)
         limited = (f"{name} {LIMITED}" for name in self._limited)
         warnings = (*self._disabled, *now.flags, *limited)
         return Report(

@@ -83,7 +83,9 @@ def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.fl
         SignalError: It is not.
     """
     array = check_signal(field, values, (count, count))
-    is_symmetric = np.allclose(array, array.T, rtol=1e-6, atol=0)
+    variances = np.abs(np.diag(array))
+    rounding = 1e-6 * np.sqrt(np.outer(variances, variances))
+    is_symmetric = (np.abs(array - array.T) <= rounding).all()
     if not is_symmetric or (np.linalg.eigvalsh(array) <= 0).any():
         allowed = f"a covariance {(count, count)}: symmetric and positive definite"
         raise SignalError(field, array.tolist(), allowed)

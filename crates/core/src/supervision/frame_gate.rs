@@ -66,6 +66,11 @@ impl<const N: usize> FrameGate<N> {
         })
     }
 
+    /// Whether no frame has arrived yet.
+    pub(crate) const fn is_unused(&self) -> bool {
+        self.arrived_at.is_none()
+    }
+
     /// Check at a control tick that frames arrive. None is missing before the first.
     pub fn check_gap(&mut self, time: f64) -> Flags {
         // A clock that was set back restarts the gap.

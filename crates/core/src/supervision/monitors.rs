@@ -58,6 +58,11 @@ pub struct Monitors<const N: usize> {
     /// When a measurement determined each DOF last, and the time without one after which sensors count as missing, in s.
     last_determined: [f64; N],
     gap: f64,
+    /// Travel before the first measurement in `width_limit`, up to `UNSEEN`, when it was that long, and how much later the
+    /// measurement may come.
+    first_travel: f64,
+    moved_at: f64,
+    first_within: f64,
     /// Share of the compensation that the supervisor allows, as the law uses it, and that the operator has chosen.
     share: f64,
     chosen: f64,
@@ -95,6 +100,9 @@ impl<const N: usize> Monitors<N> {
             time: f64::NAN,
             last_determined: [f64::NEG_INFINITY; N],
             gap: safety.frame_gap,
+            first_travel: 0.0,
+            moved_at: f64::NAN,
+            first_within: safety.frame_age + safety.frame_gap,
             share: 1.0,
             chosen: 1.0,
         })
@@ -125,6 +133,10 @@ impl<const N: usize> Monitors<N> {
         };
         for (increment, unit) in gated.increments.iter().zip(self.unit) {
             event.travel += increment.abs() / unit;
+        }
+        if self.first_travel <= UNSEEN {
+            self.first_travel += event.travel;
+            self.moved_at = time;
         }
         if let Some(reference) = gated.reference {
             let motion = self.motion.update_reference(reference);
@@ -241,10 +253,16 @@ impl<const N: usize> Monitors<N> {
             .for_each(|(at, _)| *at = self.time);
     }
 
-    /// A sensor that is missing is only worth a warning while others determine every DOF.
+    /// A sensor that is missing is only worth a warning while others determine every DOF. The first measurement of all may
+    /// come late, but not long after motion began.
     fn check_gap(&mut self, time: f64) -> Flags {
+        let has_none = self.frames.iter().all(FrameGate::is_unused);
+        let has_moved = self.first_travel > UNSEEN;
+        let is_blind = has_none && has_moved && time - self.moved_at > self.first_within;
         let gates = self.frames.iter_mut();
-        let found = gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)));
+        let found = gates.fold(Flags::when(is_blind, Flag::Dropped), |flags, gate| {
+            flags.union(gate.check_gap(time))
+        });
         let mut is_spared = !found.is_empty();
         for at in &mut self.last_determined {
             *at = at.min(time);

@@ -17,6 +17,7 @@ use proptest::prelude::*;
 
 use super::config;
 use super::support::{PERIOD, dofs_in, safety_in};
+use crate::supervision::settings::SafetySettings;
 
 type Checked = Result<(), TestCaseError>;
 
@@ -231,7 +232,11 @@ fn supervised<const N: usize>(group: [usize; N], half_width: f64) -> (Monitors<N
         (dof.delta_minus, dof.delta_plus) = (-half_width * unit, half_width * unit);
     }
     let limiters = limiters(group, dofs[0].gain_limit);
-    let monitors = Monitors::new(&safety_in(units()), &dofs, PERIOD, limiters).unwrap();
+    let safety = SafetySettings {
+        off: Flags::of(Flag::Dropped),
+        ..safety_in(units())
+    };
+    let monitors = Monitors::new(&safety, &dofs, PERIOD, limiters).unwrap();
     let law = Article::with_estimation(&dofs, monitors.play_limits(), Measured).unwrap();
     (monitors, law)
 }

@@ -6,7 +6,7 @@ use crate::r#loop::paper::Paper;
 use crate::supervision::flags::Flag;
 
 use super::support::loops::{Loop, article_with};
-use super::support::{PERIOD, UNITS, safety};
+use super::support::{PERIOD, UNITS, open_loop};
 
 /// A loop with the true slack, and the tip; in [`UNITS`] of the insertion.
 struct Run {
@@ -20,7 +20,7 @@ struct Run {
 impl Run {
     fn begun(recovery: f64, minus: f64, plus: f64) -> Self {
         let mut run = Self {
-            reduction: article_with(&safety(), recovery, |unit| {
+            reduction: article_with(&open_loop(), recovery, |unit| {
                 Play::new(minus * unit, plus * unit).unwrap()
             }),
             input: 0.0,

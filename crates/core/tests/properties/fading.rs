@@ -88,6 +88,34 @@ fn overcompensation_that_lasts_fades_compensation_as_a_fault_of_the_images_does(
     fades_and_returns(Flag::Overcompensation);
 }
 
+/// A sensor that never speaks is as bad as one that falls silent.
+#[test]
+fn compensation_fades_without_a_first_measurement_and_returns_with_it() {
+    let play = |unit: f64| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
+    let mut strokes = Strokes::new(article_with(&safety(), 0.0, play));
+    let has = |strokes: &Strokes| {
+        let flags = strokes.reduction.supervision().flags;
+        flags.contains(Flag::Dropped)
+    };
+    for _ in 0..74 {
+        strokes.go(0.1);
+    }
+    // A quarter of the width of 30, and then as long as a first measurement may take.
+    let ticks = (0..1000).take_while(|_| {
+        strokes.go(0.1);
+        !has(&strokes)
+    });
+    let waited = f64::from(u32::try_from(ticks.count()).unwrap()) * PERIOD;
+    assert!((waited - 0.48).abs() < 3.0 * PERIOD, "{waited} s");
+    for _ in 0..1800 {
+        strokes.go(0.1);
+    }
+    assert_eq!(strokes.reduction.supervision().lead, 0.0);
+    strokes.travel(100, None);
+    assert!(!has(&strokes));
+    assert_eq!(strokes.reduction.supervision().lead, 1.0);
+}
+
 fn fades_and_returns(flag: Flag) {
     let play = |unit: f64| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
     let mut strokes = Strokes::new(article(play));

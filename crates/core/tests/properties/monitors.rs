@@ -116,7 +116,9 @@ fn a_device_that_was_silent_moves_nothing_until_re_engaged() {
 fn a_jump_that_passes_the_gate_is_stopped_by_the_command_limiter_and_moves_nothing() {
     for jump in [6.0, -6.0, 40.0] {
         let settings = SafetySettings {
-            off: Flags::of(Flag::ReferenceJump).union(Flags::of(Flag::ReferenceFast)),
+            off: Flags::of(Flag::ReferenceJump)
+                .union(Flags::of(Flag::ReferenceFast))
+                .union(Flags::of(Flag::Dropped)),
             ..safety()
         };
         let mut reduction = article_with(&settings, 0.0, |unit| {

@@ -74,7 +74,10 @@ fn the_end_of_the_travel_is_neither_a_jump_nor_a_violation() {
 #[test]
 fn tremor_is_flagged_unless_its_detector_is_off() {
     for off in [Flags::NONE, Flags::of(Flag::Tremor)] {
-        let settings = SafetySettings { off, ..safety() };
+        let settings = SafetySettings {
+            off: off.union(Flags::of(Flag::Dropped)),
+            ..safety()
+        };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
         for tick in 0..1000_u32 {
             let time = f64::from(tick) * PERIOD;

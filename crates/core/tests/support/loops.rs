@@ -8,7 +8,7 @@ use tautscope_core::{
     Settings,
 };
 
-use super::{UNITS, safety, settings};
+use super::{UNITS, open_loop, safety, settings};
 
 /// A loop with its history on the heap.
 pub type Loop<P> = HysteresisReduction<P, Vec<Entry>>;
@@ -20,7 +20,7 @@ pub fn model() -> FeatureModel {
 
 /// Profile `paper`; `play` gives the initial estimate of a DOF from its unit.
 pub fn article(play: impl Fn(f64) -> Play) -> Loop<Paper> {
-    article_with(&safety(), 0.0, play)
+    article_with(&open_loop(), 0.0, play)
 }
 
 /// [`article`] with other settings of the monitors and another `recovery`.
@@ -45,7 +45,7 @@ pub fn article_with(
 
 /// Profile `best`.
 pub fn best() -> Loop<Best> {
-    best_with(&safety(), 4.0)
+    best_with(&open_loop(), 4.0)
 }
 
 /// [`best`] with other settings of the monitors and another Mahalanobis distance of outliers.

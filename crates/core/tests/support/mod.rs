@@ -4,8 +4,8 @@ pub mod loops;
 pub mod plays;
 
 use tautscope_core::{
-    CameraSettings, ControlSettings, DofSettings, EstimateSettings, Flags, InstrumentSettings,
-    LawSettings, PoseSettings, SafetySettings, Settings,
+    CameraSettings, ControlSettings, DofSettings, EstimateSettings, Flag, Flags,
+    InstrumentSettings, LawSettings, PoseSettings, SafetySettings, Settings,
 };
 
 pub const UNITS: [f64; 3] = [0.4e-3, 0.04, 0.02];
@@ -14,6 +14,14 @@ pub const PERIOD: f64 = 0.005;
 /// Settings of the monitors in [`UNITS`].
 pub fn safety() -> SafetySettings {
     safety_in(UNITS)
+}
+
+/// [`safety`] of a loop that is never told where the tip is.
+pub fn open_loop() -> SafetySettings {
+    SafetySettings {
+        off: Flags::of(Flag::Dropped),
+        ..safety()
+    }
 }
 
 /// Settings of the monitors with lengths in the given units.

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_int, c_void};
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
-use crate::measurement::{tautscope_loop_on_measurement, tautscope_loop_on_tip};
+use crate::measurement::{is_covariance, tautscope_loop_on_measurement, tautscope_loop_on_tip};
 use crate::reduction::{
     TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_dof,
     tautscope_loop_hysteresis, tautscope_loop_predicted_state, tautscope_loop_size,
@@ -79,6 +79,15 @@ fn measurement(values: &[f64], covariance: *const f64) -> TautscopeMeasurement {
         sensor: 0,
         point: 0,
     }
+}
+
+/// Where a covariance was turned, entries beside large ones are rounded.
+#[test]
+fn a_covariance_is_symmetric_up_to_rounding() {
+    assert!(is_covariance(&[1e-4, 1e-22, 0.0, 1e-4], 2));
+    assert!(is_covariance(&[1e-4, 1e-10, -1e-10, 1e4], 2));
+    assert!(!is_covariance(&[1e-4, 1e-9, 0.0, 1e-4], 2));
+    assert!(!is_covariance(&[-1e-4, 0.0, 0.0, -1e-4], 2));
 }
 
 #[test]
