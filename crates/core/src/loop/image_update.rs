@@ -47,6 +47,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);
         let rate = self.monitors.check_rate(captured_at, sensor);
+        let raised = self.monitors.spare(raised, sensor);
         self.monitors.update(Source::Frame, raised.union(rate));
         outcome
     }
@@ -114,10 +115,20 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         // With an outlier nothing but the offset is learnt; of bands `merged` says so.
         let is_learnt = I::IS_WHOLE || !measurement.has_outlier;
         let determined = measurement.observable.map(|own| own && is_learnt);
-        self.monitors.determine(determined);
+        self.monitors.determine(determined, sensor);
         let is_missing = self.is_missing(past.travel, determined);
-        let is_missed = [is_missing || I::IS_WHOLE, is_missing];
-        let (status, triggers) = self.accept(&past, &measurement, is_missed, raised);
+        // Values of a sensor that were not measured leave a DOF open, as another sensor would.
+        let is_part = I::IS_WHOLE || measurement.has_outlier;
+        let part = if is_part {
+            Flag::Merged
+        } else {
+            Flag::Unobservable
+        };
+        let missed = [
+            Flags::when(is_missing || I::IS_WHOLE, part),
+            Flags::when(is_missing, Flag::Unobservable),
+        ];
+        let (status, triggers) = self.accept(&past, &measurement, missed, raised);
         Outcome {
             status,
             past: Some(past),
@@ -166,12 +177,13 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
 
     /// Updates the estimates from a measurement that has passed the checks.
     ///
-    /// A part that is missing, and a DOF that it did not determine, are worth a flag where missed: no other sensor has them.
+    /// `missed` is what a part that is missing, and a DOF that it did not determine, are worth: nothing where another sensor has
+    /// them.
     fn accept(
         &mut self,
         past: &Entry<N>,
         measurement: &Measurement<N, P::Evidence>,
-        [is_part_missed, is_dof_missed]: [bool; 2],
+        [part, dof]: [Flags; 2],
         raised: &mut Flags,
     ) -> (Status, [Triggers; N]) {
         let status = if measurement.is_partial {
@@ -203,9 +215,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         }
         let (triggers, conspicuous) = self.profile.update(past, measurement, updates_offsets);
         let missed = match status {
-            Status::Held => Flags::when(is_dof_missed, Flag::Unobservable),
+            Status::Held => dof,
             Status::Ok if !measurement.has_outlier => Flags::NONE,
-            _ => Flags::when(is_part_missed, Flag::Merged),
+            _ => part,
         };
         *raised = motion.union(self.monitors.enabled(conspicuous.union(missed)));
         (status, triggers)

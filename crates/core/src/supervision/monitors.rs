@@ -2,6 +2,7 @@
 
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
+use crate::dof::zip_with;
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
@@ -19,6 +20,14 @@ use crate::supervision::supervisor::{Event, Supervision, Supervisor};
 pub const SENSORS: usize = 4;
 /// Travel of a DOF, in `width_limit`, in which a measurement should have determined it.
 const UNSEEN: f64 = 0.25;
+
+/// Faults of one sensor, which others may make up for.
+const OF_A_SENSOR: Flags = Flags::of(Flag::Frozen)
+    .union(Flags::of(Flag::Late))
+    .union(Flags::of(Flag::Duplicate))
+    .union(Flags::of(Flag::Clock))
+    .union(Flags::of(Flag::Innovation))
+    .union(Flags::of(Flag::Lost));
 
 /// The law of N DOFs, as far as supervision wraps it.
 pub trait Law<const N: usize> {
@@ -56,7 +65,7 @@ pub struct Monitors<const N: usize> {
     off: Flags,
     time: f64,
     /// When a measurement determined each DOF last, and the time without one after which sensors count as missing, in s.
-    last_determined: [f64; N],
+    last_determined: [[f64; N]; SENSORS],
     gap: f64,
     /// Travel before the first measurement in `width_limit`, up to `UNSEEN`, when it was that long, and how much later the
     /// measurement may come.
@@ -98,7 +107,7 @@ impl<const N: usize> Monitors<N> {
             unit: safety.width_limit,
             off: safety.off,
             time: f64::NAN,
-            last_determined: [f64::NEG_INFINITY; N],
+            last_determined: [[f64::NEG_INFINITY; N]; SENSORS],
             gap: safety.frame_gap,
             first_travel: 0.0,
             moved_at: f64::NAN,
@@ -246,11 +255,32 @@ impl<const N: usize> Monitors<N> {
         dofs.any(|(travel, unit)| *travel > UNSEEN * unit)
     }
 
-    /// A measurement has determined some of the DOFs (N,).
-    pub(crate) fn determine(&mut self, determined: [bool; N]) {
-        let dofs = self.last_determined.iter_mut().zip(determined);
-        dofs.filter(|(_, is_new)| *is_new)
+    /// A measurement of one of the sensors has determined some of the DOFs (N,).
+    pub(crate) fn determine(&mut self, determined: [bool; N], sensor: usize) {
+        let dofs = self.last_determined.get_mut(sensor).into_iter().flatten();
+        dofs.zip(determined)
+            .filter(|(_, is_new)| *is_new)
             .for_each(|(at, _)| *at = self.time);
+    }
+
+    /// Whether sensors other than one, if one is given, determine every DOF.
+    fn is_determined(&self, time: f64, without: Option<usize>) -> bool {
+        let since = time - self.gap;
+        let sensors = self.last_determined.iter().enumerate();
+        let others = sensors.filter(|(sensor, _)| Some(*sensor) != without);
+        let known = others.fold([false; N], |known, (_, dofs)| {
+            zip_with(known, *dofs, |known, at| known || at >= since)
+        });
+        known == [true; N]
+    }
+
+    /// What a measurement of one of the sensors raised; while others determine every DOF, its faults are worth a warning.
+    pub(crate) fn spare(&self, raised: Flags, sensor: usize) -> Flags {
+        let rest = raised.difference(OF_A_SENSOR);
+        if rest == raised || !self.is_determined(self.time, Some(sensor)) {
+            return raised;
+        }
+        self.enabled(rest.union(Flags::of(Flag::FrameRate)))
     }
 
     /// A sensor that is missing is only worth a warning while others determine every DOF. The first measurement of all may
@@ -263,11 +293,10 @@ impl<const N: usize> Monitors<N> {
         let found = gates.fold(Flags::when(is_blind, Flag::Dropped), |flags, gate| {
             flags.union(gate.check_gap(time))
         });
-        let mut is_spared = !found.is_empty();
-        for at in &mut self.last_determined {
+        for at in self.last_determined.iter_mut().flatten() {
             *at = at.min(time);
-            is_spared &= time - *at <= self.gap;
         }
+        let is_spared = !found.is_empty() && self.is_determined(time, None);
         self.enabled(if is_spared {
             Flags::of(Flag::FrameRate)
         } else {
