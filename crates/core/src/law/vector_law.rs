@@ -89,8 +89,9 @@ pub struct VectorLaw<const N: usize> {
     pub origin: [f64; N],
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
-    /// Travel of the reference, in units.
+    /// Travel of the reference, in units, and the share of it that counts: without the first stroke 0 until it turns.
     travel: [f64; N],
+    counted: [f64; N],
     /// Coefficients in use, and the slack that they make.
     rows: [Row; N],
     slack: [Slack; N],
@@ -113,6 +114,8 @@ pub struct Bounds<const N: usize> {
     pub input_age: f64,
     /// Limits of the contact offsets.
     pub offsets: [PlayLimit; N],
+    /// Whether the travel of START begins with the first stroke, in which nothing tells the slack, or where it ends.
+    pub counts_first_stroke: bool,
 }
 
 impl<const N: usize> VectorLaw<N> {
@@ -153,6 +156,7 @@ impl<const N: usize> VectorLaw<N> {
             origin: [f64::NAN; N],
             target: [0.0; N],
             travel: [0.0; N],
+            counted: [f64::from(u8::from(bounds.counts_first_stroke)); N],
             rows: [[0.0; COEFFICIENTS]; N],
             slack: [Slack::default(); N],
             share: 1.0,
@@ -196,6 +200,11 @@ impl<const N: usize> VectorLaw<N> {
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let friction = self.transmission.friction();
         let turn = friction.sum(zip_with(before, direction, |a, b| a * b));
+        self.counted = zip_with(
+            self.counted,
+            turn,
+            |share, turn| if turn < 0.0 { 1.0 } else { share },
+        );
         self.surplus = zip_with(
             self.surplus,
             turn,
@@ -259,7 +268,8 @@ impl<const N: usize> VectorLaw<N> {
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
-        self.travel = zip_with(self.travel, moved, |sum, own| sum + own);
+        let counted = zip_with(self.counted, moved, |share, own| share * own);
+        self.travel = zip_with(self.travel, counted, |sum, own| sum + own);
         if self.rows == *rows {
             return;
         }
