@@ -126,6 +126,21 @@ def test_a_start_at_an_end_of_the_slack_costs_the_first_seconds(start: float, ze
         assert np.std(settled) < 0.12 * widths[axis] / 2
 
 
+def test_a_long_first_stroke_does_not_keep_a_slack_that_is_not_there() -> None:
+    """A sixth of the expected slack: nothing tells it before the first reversal."""
+    loop, tip, errors = HysteresisReduction(axes(1, width_limit=0.9)), np.zeros(1), []
+    for tick in range(20000):
+        time = tick * PERIOD
+        reference = [np.sin(0.04 * np.pi * time)]
+        command = loop.step(reference, time)
+        tip = np.clip(tip, command - 0.05, command + 0.05)
+        if tick % 5 == 0:
+            loop.on_tip(tip, time)
+        errors.append((tip - reference)[0])
+    # The first reversal is at 12.5 s.
+    assert np.std(errors[4000:]) < 0.01
+
+
 def test_twice_the_expected_slack_is_learned() -> None:
     """After a minute no more is left than of the expected slack."""
     errors, _ = sine_errors(np.full(2, 1.0), np.zeros(2), 0.0, 90.0)
@@ -327,7 +342,7 @@ def test_two_equal_values_say_as_much_as_one_of_half_the_variance() -> None:
                 stack @ tip, time, np.eye(4) * 2e-4, lambda q: stack @ q, jacobian=lambda _: stack
             )
             np.testing.assert_allclose(first.state_estimate, second.state_estimate, atol=1e-4)
-    np.testing.assert_allclose(once.delta_plus, twice.delta_plus, rtol=1e-3)
+    np.testing.assert_allclose(once.delta_plus, twice.delta_plus, rtol=3e-3)
 
 
 def test_what_was_not_measured_is_held() -> None:
@@ -350,9 +365,9 @@ def test_repeated_late_and_future_measurements() -> None:
     assert loop.on_tip([0.29], now - 0.15).status == "duplicate"
     assert loop.on_tip([0.29], now - 0.15, sensor=1).status == "ok"
     assert loop.on_tip([0.3], now - 0.5, sensor=2).status == "refused"
-    assert "late" in loop.supervision.latched
     assert loop.on_tip([0.3], now + 1.0).status == "stale"
-    assert "clock" in loop.supervision.latched
+    # Others measured the same just now.
+    assert loop.supervision.latched == ("duplicate", "dropped", "frame_rate")
 
 
 def test_a_late_sensor_counts_at_the_time_of_its_measurement() -> None:
@@ -391,7 +406,26 @@ def test_sensors_may_share_the_dofs() -> None:
         if tick == 5999:
             assert loop.supervision.latched == ()
     np.testing.assert_array_less(np.sqrt(np.mean(np.square(errors[3000:6000]), axis=0)), 0.05)
-    assert "merged" in loop.supervision.latched
+    assert loop.supervision.latched == ("unobservable",)
+
+
+def test_a_degree_of_freedom_that_is_never_measured_leaves_the_others_compensated() -> None:
+    def look(loop: HysteresisReduction, tip: Floats, captured_at: float) -> Report:
+        return loop.on_tip([tip[0], np.nan], captured_at)
+
+    loop = HysteresisReduction(axes(2, width_limit=1.0))
+    assert operate(loop, Plays([0.6, 0.6]), look)[0] < 0.03
+    assert loop.supervision.latched == ("unobservable",)
+    assert loop.supervision.reaction == "warn"
+
+
+def test_motion_within_the_slack_does_not_move_a_tip_that_is_measured_without_noise() -> None:
+    """Forth and back, farther in sum than any slack is wide."""
+    loop, plant = HysteresisReduction(axes(1, width_limit=1.0), compensate=False), Plays([0.6])
+    for tick in range(12000):
+        time = tick * PERIOD
+        loop.on_tip(plant(loop.step([0.25 * np.sin(3 * time)], time)), time)
+    assert loop.supervision.latched == ()
 
 
 def test_a_tracker_that_repeats_its_value_is_frozen() -> None:

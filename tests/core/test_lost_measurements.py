@@ -2,6 +2,7 @@
 without it."""
 
 import logging
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -66,6 +67,37 @@ def test_the_log_says_once_why_nothing_is_compensated(
     lines = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
     assert len(lines) == (cause is not None)
     assert all("Compensation fades out" in line and str(cause) in line for line in lines)
+
+
+FAULTS: dict[str, Callable[[float], tuple[float, float]]] = {
+    "stuck": lambda tip: (0.001, 0.0),
+    "off": lambda tip: (tip + 0.02, 0.0),
+    "ahead": lambda tip: (tip, 5.0),
+    "late": lambda tip: (tip, -0.4),
+}
+"""What a sensor measures instead of the tip [m], and how much later than it is [s]."""
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_sensor_may_fail_where_another_one_measures_the_same(fault: str) -> None:
+    config = from_document({"dof": [DOF]})
+    rig, loop = PlayRig(config, [4e-3]), HysteresisReduction(config)
+    sample, found = rig.reset(), []
+    while sample.time < END:
+        reference = 0.01 * np.sin(2 * np.pi * sample.time / CYCLE)
+        sample = rig.step(loop.step([reference], sample.time))
+        for tip in sample.measurement:
+            values, time = np.array(tip.values), tip.captured_at
+            loop.on_tip(values, time)
+            if time > LOST:
+                values, ahead = FAULTS[fault](float(values[0]))
+                time += ahead
+            loop.on_tip([float(np.ravel(values)[0])], time, sensor=1)
+        if sample.time > END - CYCLE:
+            found.append(sample.true_state[0] - reference)
+    assert np.std(found) < 0.1 * np.std(errors(False))
+    assert loop.supervision.lead == 1.0
+    assert "frame_rate" in loop.supervision.latched
 
 
 @pytest.mark.parametrize("others", [True, False], ids=["both", "each its own"])

@@ -158,8 +158,8 @@ impl AxesSettings {
                 dof.range.unwrap_or((-far, far))
             }),
             reference_count: dofs.map(|dof| dof.width_limit / COUNTS),
-            // An encoder repeats its value bit for bit while the slack is crossed.
-            frozen_travel: 2.0 * UPDATES,
+            // An encoder repeats its value bit for bit while the slack is crossed, and until its next count.
+            frozen_travel: 1.5 * UPDATES,
             ; off; reference_time; reference_age; late_tick; stall; frame_age; frame_gap; clock_jump; innovation_limit
             ; tremor_swing; tremor_rate; ahead_limit; ahead_ratio; offset_decrease; cycle_swings; cycle_growth; cycle_time
             ; hold_time; hold_travel; fade_travel; restore_travel; good_frames; good_ticks

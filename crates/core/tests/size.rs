@@ -11,5 +11,5 @@ fn a_loop_fits_on_a_stack() {
         size_of::<HysteresisReduction<Best>>(),
     ];
     println!("paper {paper}, best {best}");
-    assert!(paper <= 40_000 && best <= 120_000, "{paper} {best}");
+    assert!(paper <= 41_000 && best <= 120_000, "{paper} {best}");
 }

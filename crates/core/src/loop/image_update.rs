@@ -42,7 +42,14 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             captured_at,
             now: self.history.newest_time(),
             image,
-            travel: past.map(|past| past.travel),
+            is_whole: I::IS_WHOLE,
+            travel: past.map(|past| {
+                if I::IS_WHOLE {
+                    past.travel
+                } else {
+                    past.command
+                }
+            }),
         };
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);

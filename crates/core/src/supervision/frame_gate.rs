@@ -24,7 +24,10 @@ pub struct FrameArrival<const N: usize> {
     pub now: f64,
     /// None if neither pixels nor features are known.
     pub image: Option<ImageIdentity>,
-    /// Path length of the command at the capture time [m or rad]; None where the history does not reach.
+    /// Whether it depends on every DOF and has noise, as an image.
+    pub is_whole: bool,
+    /// Path length of the command at the capture time [m or rad], or if it is not whole the command: within the slack a motor
+    /// moves as often as it likes. None where the history does not reach.
     pub travel: Option<[f64; N]>,
 }
 
@@ -106,11 +109,14 @@ impl<const N: usize> FrameGate<N> {
         };
         match self.repeated {
             Some((repeated, then)) if repeated == image => {
-                let moved = zip_with(travel, then, |now, then| now - then);
-                moved
-                    .iter()
-                    .zip(self.frozen_travel)
-                    .any(|(moved, limit)| *moved >= limit)
+                let moved = zip_with(travel, then, |now, then| (now - then).abs());
+                let mut dofs = moved.iter().zip(self.frozen_travel);
+                let is_far = |(moved, limit): (&f64, f64)| *moved >= limit;
+                if arrival.is_whole {
+                    dofs.any(is_far)
+                } else {
+                    dofs.all(is_far)
+                }
             }
             _ => {
                 self.repeated = Some((image, travel));

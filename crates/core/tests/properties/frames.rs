@@ -1,6 +1,6 @@
 //! The frame gate: times, images and innovations of frames.
 
-use crate::dof::PerDof;
+use crate::dof::{PerDof, zip_with};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, FrameGate, ImageIdentity};
 use crate::supervision::settings::SafetySettings;
@@ -24,7 +24,7 @@ proptest! {
         let mut gate = new_gate();
         let mut travel = UNITS.map(|limit| 3.7 * limit);
         let mut arrive = |image: Option<ImageIdentity>, travel: Option<PerDof<f64>>| {
-            gate.check_arrival(&FrameArrival { captured_at: 1.0, now: 1.0, image, travel })
+            gate.check_arrival(&FrameArrival { captured_at: 1.0, now: 1.0, image, is_whole: true, travel })
         };
         let [first, other] = if known {
             [ImageIdentity::Checksum(7), ImageIdentity::Checksum(8)]
@@ -46,6 +46,32 @@ proptest! {
     }
 }
 
+/// A sensor of some DOFs, without noise: only once all have moved farther than any slack.
+#[test]
+fn a_measurement_that_is_repeated_is_frozen_once_every_dof_has_moved() {
+    let mut gate = new_gate();
+    let mut arrive = |share: [f64; 3]| {
+        gate.check_arrival(&FrameArrival {
+            captured_at: 1.0,
+            now: 1.0,
+            image: Some(ImageIdentity::Checksum(7)),
+            is_whole: false,
+            travel: Some(zip_with(share, UNITS, |share, unit| share * unit)),
+        })
+    };
+    for _ in 0..10 {
+        for share in [
+            [0.0; 3],
+            [-0.9, 0.0, 0.9],
+            [9.0, -9.0, 0.9],
+            [9.0, 0.0, 9.0],
+        ] {
+            assert_eq!(arrive(share), Flags::NONE, "{share:?}");
+        }
+    }
+    assert_eq!(arrive([-1.1, 1.1, 1.1]), Flags::of(Flag::Frozen));
+}
+
 /// The flags of a frame's times.
 fn arrive(gate: &mut FrameGate<3>, captured_at: f64, now: f64, is_in_history: bool) -> Flags {
     let travel = is_in_history.then_some([0.0; 3]);
@@ -53,6 +79,7 @@ fn arrive(gate: &mut FrameGate<3>, captured_at: f64, now: f64, is_in_history: bo
         captured_at,
         now,
         image: None,
+        is_whole: true,
         travel,
     })
 }

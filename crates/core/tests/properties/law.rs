@@ -70,6 +70,7 @@ impl<const N: usize> Checked<N> {
             period: PERIOD,
             input_age: 0.05,
             offsets: unit.map(|unit| PlayLimit::new(2.0 * unit, 1.5 * unit).unwrap()),
+            counts_first_stroke: true,
         };
         let mut checked = Self {
             law: VectorLaw::new(settings, transmission, &bounds).unwrap(),
@@ -335,6 +336,7 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
         period: PERIOD,
         input_age: 0.05,
         offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
+        counts_first_stroke: true,
     };
     let mut law = VectorLaw::new(own, transmission, &bounds).unwrap();
     let mut rows = [[0.0; COEFFICIENTS]; 1];
@@ -416,6 +418,7 @@ fn the_slack_is_crossed_as_fast_with_an_input_device_slower_than_the_loop() {
         period: PERIOD,
         input_age: 0.05,
         offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
+        counts_first_stroke: true,
     };
     let mut rows = [[0.0; COEFFICIENTS]; 1];
     // The largest own play, a slack of 2.5: none of these motions crosses it.
