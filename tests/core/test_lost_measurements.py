@@ -123,3 +123,17 @@ def test_a_sensor_may_be_lost_where_another_one_measures_the_same(others: bool) 
     else:
         assert loop.supervision.reaction == "fade"
         np.testing.assert_allclose(left, without, rtol=0.02)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.2, 4.0])
+def test_the_log_says_once_that_ticks_come_at_another_interval(
+    share: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    config = from_document({"dof": [DOF]})
+    loop, interval = HysteresisReduction(config), share * config.control.period
+    for tick in range(500):
+        loop.step([1e-5 * tick], tick * interval)
+        loop.on_tip([1e-5 * tick], tick * interval)
+    lines = [line for line in caplog.messages if "control.period" in line]
+    assert len(lines) == (share != 1.2)
+    assert all(f"ticks every {interval:.4g} s" in line for line in lines)

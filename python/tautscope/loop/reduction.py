@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -39,7 +40,7 @@ Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
 LOGGED_TICKS = 100
-"""After so many ticks each a log message says why nothing is compensated, unless it was said."""
+"""After so many ticks each the log says, once, why nothing is compensated or ticks are late."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -185,6 +186,7 @@ class HysteresisReduction:
         self._limited_before: set[str] = set()
         self._least_logged = Reaction.FADE if compensate else Reaction.HOLD_MOTION
         self._logged: set[Reaction] = set()
+        self._logged_at, self._has_logged_interval = math.nan, False
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -223,6 +225,7 @@ class HysteresisReduction:
         self._limited = ()
         if self._ticks % LOGGED_TICKS == 0:  # no report tells of measurements that do not come
             self._log_reaction(time, self.supervision)
+            self._log_interval(time)
         return self._loop.step(
             values, time, made_at, None if self._actuators is None else self._within_limits
         )
@@ -521,6 +524,15 @@ class HysteresisReduction:
         if now.reaction.rank >= self._least_logged.rank and now.reaction not in self._logged:
             self._logged.add(now.reaction)
             _LOG.warning("at %.3f s: %s", time, now.effect)
+
+    def _log_interval(self, time: float) -> None:
+        interval = (time - self._logged_at) / LOGGED_TICKS
+        self._logged_at = time
+        period = self._config.control.period
+        if not self._has_logged_interval and not 0.7 < interval / period < 1.4 and interval > 0:
+            self._has_logged_interval = True
+            what = "the bounds of speed hold for control.period, and late ticks move nothing"
+            _LOG.warning("ticks every %.4g s, control.period = %g s: %s", interval, period, what)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
