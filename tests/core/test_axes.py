@@ -141,6 +141,22 @@ def test_a_long_first_stroke_does_not_keep_a_slack_that_is_not_there() -> None:
     assert np.std(errors[4000:]) < 0.01
 
 
+@pytest.mark.parametrize("compensate", [True, False])
+def test_motors_need_not_be_faster_than_they_are(compensate: bool) -> None:
+    """Two and a half times as fast as the reference, without a flag."""
+    config = axes(1, width_limit=0.9, command_speed=1.5)
+    loop, plant, errors = HysteresisReduction(config, compensate), Plays([0.6]), []
+    for tick in range(8000):
+        time = tick * PERIOD
+        reference = np.array([np.sin(0.6 * time)])
+        tip = plant(loop.step(reference, time))
+        if tick % 5 == 0:
+            loop.on_tip(tip, time)
+        errors.append((tip - reference)[0])
+    assert loop.supervision.latched == ()
+    assert np.std(errors[4000:]) < (0.03 if compensate else 0.3)
+
+
 def test_twice_the_expected_slack_is_learned() -> None:
     """After a minute no more is left than of the expected slack."""
     errors, _ = sine_errors(np.full(2, 1.0), np.zeros(2), 0.0, 90.0)

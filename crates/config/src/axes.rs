@@ -126,7 +126,7 @@ impl AxesSettings {
             }
         });
         Ok(core::LoopSettings {
-            dofs: dofs.map(|dof| dof.settings(&self.insertion, compensate)),
+            dofs: dofs.map(|dof| dof.settings(&self.insertion, self.gain(dof, compensate))),
             friction: core::Friction::new(group, dofs.map(|dof| dof.lever))?,
             control: self.control,
             safety: self.safety_of(dofs),
@@ -140,6 +140,15 @@ impl AxesSettings {
             },
             estimation: self.estimation,
         })
+    }
+
+    /// `K_b` of the article's law: so many times slower than `command_speed` is the reference, so that no command is faster.
+    fn gain(&self, dof: &AxisSettings, compensate: bool) -> f64 {
+        match self.profile {
+            Profile::Paper if compensate => dof.gain_limit,
+            // The vector law bounds its commands itself.
+            Profile::Paper | Profile::Best => 1.0,
+        }
     }
 
     fn safety_of<const N: usize>(&self, dofs: [&AxisSettings; N]) -> core::SafetySettings<N> {
@@ -201,14 +210,14 @@ impl AxisSettings {
         self.command_speed.map_or(usual, |own| own.min(usual))
     }
 
-    fn settings(&self, article: &core::DofSettings, compensate: bool) -> core::DofSettings {
+    fn settings(&self, article: &core::DofSettings, gain: f64) -> core::DofSettings {
         let width = self.width_limit;
         core::DofSettings {
             update_distance: width / UPDATES,
             expected_width: self.expected_width.unwrap_or(EXPECTED_WIDTH * width),
             start_deviation: START_DEVIATION * width,
-            free_gain: if compensate { self.gain_limit } else { 1.0 },
-            gain_limit: self.gain_limit,
+            free_gain: gain,
+            gain_limit: gain,
             delta_minus: self.delta_minus,
             delta_plus: self.delta_plus,
             ..*article

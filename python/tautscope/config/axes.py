@@ -43,7 +43,7 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """K_b of profile ``paper``."""
     command_speed: Annotated[float, Meta(gt=0, le=10_000)] | None = None
     """Largest speed of the command [m or rad per s]; at most 2 gain_limit times `speed`, and what
-    the motors of [drives] can do."""
+    the motors of [drives] can do. ``paper`` follows the reference at this over gain_limit."""
     delta_minus: float = 0.0
     """Initial offset at the negative contact [m or rad]."""
     delta_plus: float = 0.0
