@@ -141,6 +141,19 @@ def test_a_long_first_stroke_does_not_keep_a_slack_that_is_not_there() -> None:
     assert np.std(errors[4000:]) < 0.01
 
 
+def test_motion_beyond_the_range_is_discarded_which_the_followed_reference_shows() -> None:
+    loop, plant = HysteresisReduction(axes(1, width_limit=0.9, range=(-1, 1))), Plays([0.6])
+    assert np.isnan(loop.reference).all()
+    for tick in range(8000):
+        time = tick * PERIOD
+        reference = np.sin(0.2 * np.pi * np.minimum([time], 5.0)) + 0.4 * np.sin(0.6 * time)
+        tip = plant(loop.step(reference, time))
+        if tick % 5 == 0:
+            loop.on_tip(tip, time)
+    assert reference[0] - loop.reference[0] > 0.1
+    assert abs(tip[0] - loop.reference[0]) < 0.05
+
+
 @pytest.mark.parametrize("compensate", [True, False])
 def test_motors_need_not_be_faster_than_they_are(compensate: bool) -> None:
     """Two and a half times as fast as the reference, without a flag."""

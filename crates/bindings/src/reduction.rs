@@ -258,6 +258,12 @@ impl Reduction {
         ))
     }
 
+    /// The reference that the law follows (n,).
+    #[getter]
+    fn reference<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        self.floats(py, &self.0.reference())
+    }
+
     /// The predicted state (n,) now.
     #[getter]
     fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {

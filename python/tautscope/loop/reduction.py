@@ -448,6 +448,15 @@ class HysteresisReduction:
         return self._band_loop("predicted_features").predicted_features(captured_at)
 
     @property
+    def reference(self) -> NDArray[np.float64]:
+        """The reference that the law follows (n,) [m or rad]; NaN before the first.
+
+        It differs from the last one given by motion that was discarded, or that is too fast: beyond
+        the range of a command or of a motor, after a late tick, while motion was held.
+        """
+        return self._loop.reference
+
+    @property
     def predicted_state(self) -> NDArray[np.float64]:
         """The model's tip state q (n,) [m or rad] now; NaN before the first tick."""
         return self._loop.predicted_state

@@ -33,6 +33,9 @@ pub trait Loop {
         limit: &mut dyn FnMut(&[f64], &mut [f64]),
     );
 
+    /// The reference that the law follows, behind the gate; NaN before the first.
+    fn reference(&self) -> [f64; DOFS];
+
     /// The predicted state now.
     fn predicted_state(&self) -> [f64; DOFS];
 
@@ -116,6 +119,10 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             next
         });
         command.iter_mut().zip(next).for_each(|(to, of)| *to = of);
+    }
+
+    fn reference(&self) -> [f64; DOFS] {
+        padded(self.monitors.reference(), f64::NAN)
     }
 
     fn predicted_state(&self) -> [f64; DOFS] {
