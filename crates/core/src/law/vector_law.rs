@@ -48,7 +48,8 @@ const LARGEST_CORRECTION: f64 = 0.2;
 ///           |dc| - |du| <= n (v + n ACCELERATION period^2),   v <- (|dc| - |du|) / n, 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
-///           rate = change_rate (1 + (START / travel)^2) / ratio^2
+///           rate = change_rate (1 + (START / travel)^2) / ratio^2,   travel of a DOF, from its first reversal where
+///           `counts_first_stroke` is false
 /// ```
 ///
 /// with the ticks n since the reference moved last, 1 after a rest of more than `input_age`: an input device may be slower
