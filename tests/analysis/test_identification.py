@@ -41,6 +41,27 @@ def test_width_delay_and_gain_are_found_with_honest_intervals() -> None:
     assert delays >= 26, delays
 
 
+def test_a_loop_of_another_shape_is_not_taken_for_a_tip_that_moves_before_its_command() -> None:
+    """Bouc and Wen's model with n = 1.5; a tip that is stamped too early is found as such."""
+    time = np.arange(0.0, 60.0, 0.02)
+    command = 10 * np.sin(0.4 * np.pi * time)
+    deflection, z = np.zeros(len(time)), 0.0
+    for k, step in enumerate(np.diff(command), start=1):
+        z += 0.24 * step * (1 - 0.6 * np.sign(step) * np.sqrt(abs(z)) * z - 0.4 * abs(z) ** 1.5)
+        deflection[k] = z
+    noise = 0.05 * np.random.default_rng(1).standard_normal(len(time))
+    result = identify(time, command, command - 2.09 * deflection + noise)
+    assert result.delay.value > -0.005
+    width = 4.18 * np.median(np.abs(deflection[750:][np.abs(command[750:]) < 0.5]))
+    assert result.width.value == pytest.approx(width, rel=0.15)
+    early = identify(time, command, play(command, -1.0, 1.0) + noise)
+    assert early.delay.value == pytest.approx(0.0, abs=0.005)
+    early = identify(
+        time + 0.1, command, np.interp(time + 0.2, time, play(command, -1.0, 1.0)) + noise
+    )
+    assert early.delay.value == pytest.approx(-0.2, abs=0.02)
+
+
 @pytest.mark.parametrize("kind", WITHOUT_SLACK)
 def test_a_tip_without_slack_is_aligned(kind: str) -> None:
     aligned = 0

@@ -29,6 +29,9 @@ NEGLIGIBLE = 0.03
 """Largest slack that would not have been seen, as a share of the tip's range."""
 LEAST_ADVANTAGE = 1.05
 """Error of a lag without slack, over that of the model."""
+EARLY = 1.25
+"""Error without a delay, over that of a tip before its command, which is one of the time stamps:
+below it the tip's loop has other corners than those of the model."""
 MOST_STROKES = 10
 """Times the strokes of a record that a person can be asked for."""
 _LARGEST = 0.49
@@ -229,7 +232,12 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
         ),
         key=lambda f: f[1],
     )
-    x = fits["rounded slack and delay"][0]
+    x, error = fits["rounded slack and delay"]
+    if x[2] < 0:
+        at_once = np.array([True, True, False])
+        other = refined(shape(x * at_once), at_once)
+        if other[1] < EARLY * error:
+            x, error = fits["rounded slack and delay"] = other
     found = shape(x)
     weights = signals.solve(found)[0]
     width, delay = _jackknife(signals, found)
@@ -244,7 +252,7 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
         rounding=found.rounding,
         drift=drift,
         predicted=predicted,
-        noise=fits["rounded slack and delay"][1],
+        noise=error,
         explanations={name: error for name, (_, error) in fits.items()},
         strokes=len(_stroke_ends(signals, found)) + 1,
         p_value=p_value,
