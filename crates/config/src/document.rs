@@ -352,11 +352,10 @@ fn merge(
                 merge(default, value, &format!("{name}.{key}"), &[], has_axes)?;
             }
             Some(default) if kind(default) != kind(value) => {
-                return Err(Error(format!(
-                    "{name}.{key}: got {}, expected {}",
-                    value.type_str(),
-                    kind(default)
-                )));
+                let found = value.as_str().map(|text| format!("{text:?}"));
+                let found = found.unwrap_or_else(|| value.type_str().into());
+                let kind = kind(default);
+                return Err(Error(format!("{name}.{key}: got {found}, expected {kind}")));
             }
             None if !is_free && !optional.contains(&key.as_str()) => {
                 return Err(unknown(&format!("{name}.{key}")));

@@ -112,7 +112,7 @@ fn errors_name_the_key() {
         ),
         (
             "law.tip_gain = \"three\"".into(),
-            "law.tip_gain: got string, expected a number",
+            "law.tip_gain: got \"three\", expected a number",
         ),
         (
             "safety.off = [\"fozen\"]".into(),
@@ -200,7 +200,7 @@ fn errors_name_the_degree_of_freedom() {
         (second("widht = 3"), "dof[1].widht: unknown key"),
         (
             second("lever = \"long\""),
-            "dof[1].lever: got string, expected a number",
+            "dof[1].lever: got \"long\", expected a number",
         ),
         (
             second("range = [1, \"a\"]"),
