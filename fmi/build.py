@@ -96,7 +96,7 @@ LOOP = [
     Variable("delta_minus_*", "output", "Negative contact offset"),
     Variable("delta_plus_*", "output", "Positive contact offset"),
     Variable("estimate_*", "output", "State estimate; NaN: not known"),
-    Variable("status", "output", "Result of the last update, a TautscopeStatus", "", 0),
+    Variable("status", "output", "Result of the last update, a TautscopeStatus; at first 3", "", 0),
     Variable("reaction", "output", "From 6 on the drives must stop; a TautscopeReaction", "", 0),
     Variable("flags", "output", "Active flags, a bit 1 << TautscopeFlag each", "", 0),
 ]

@@ -5,11 +5,7 @@
 #include "loop_block.h"
 #include "unit.h"
 
-static fmi3Status checked(Unit *unit, TautscopeResult result) {
-    if (result != TAUTSCOPE_RESULT_OK) {
-        unit_log(unit, fmi3Error, "%s", tautscope_error_message());
-        return fmi3Error;
-    }
+static void write_outputs(Unit *unit) {
     const LoopBlock *block = unit->content;
     for (size_t dof = 0; dof < block->dofs; ++dof) {
         unit->values[COMMAND + dof] = block->command[dof];
@@ -20,7 +16,6 @@ static fmi3Status checked(Unit *unit, TautscopeResult result) {
     unit->values[STATUS] = block->report.status;
     unit->values[REACTION] = block->supervision.reaction;
     unit->values[FLAGS] = block->supervision.flags;
-    return fmi3OK;
 }
 
 fmi3Status content_start(Unit *unit) {
@@ -33,6 +28,7 @@ fmi3Status content_start(Unit *unit) {
         return fmi3Error;
     }
     unit->content = block;
+    write_outputs(unit);
     return fmi3OK;
 }
 
@@ -48,7 +44,12 @@ fmi3Status content_step(Unit *unit, double time, long periods) {
             result = block_update(block, values + CAPTURED_AT + 1, values[CAPTURED_AT]);
         }
     }
-    return checked(unit, result);
+    if (result != TAUTSCOPE_RESULT_OK) {
+        unit_log(unit, fmi3Error, "%s", tautscope_error_message());
+        return fmi3Error;
+    }
+    write_outputs(unit);
+    return fmi3OK;
 }
 
 void content_stop(Unit *unit) {

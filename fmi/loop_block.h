@@ -31,6 +31,17 @@ typedef struct {
     double share;
 } LoopBlock;
 
+/* Before the first measurement no state is estimated, and the loop compensates the slack that it expects. */
+static inline void block_rest(LoopBlock *block) {
+    TautscopeHysteresis expected;
+    (void)tautscope_loop_hysteresis(block->loop, &expected);
+    for (size_t dof = 0; dof < block->dofs; ++dof) {
+        block->report.state_estimate[dof] = NAN;
+        block->report.delta_minus[dof] = expected.centre[dof] - expected.half_width[dof];
+        block->report.delta_plus[dof] = expected.centre[dof] + expected.half_width[dof];
+    }
+}
+
 /* Creates the loop from the file of a configuration; else 0, and `message` says why. */
 static inline int block_create(LoopBlock *block, const char *file, char *message, size_t length) {
     TautscopeStatePrediction bands;
@@ -53,6 +64,7 @@ static inline int block_create(LoopBlock *block, const char *file, char *message
         /* With [[dof]] no bands can be predicted. */
         block->has_bands = tautscope_loop_predict_state(block->loop, 0.0, &bands) == TAUTSCOPE_RESULT_OK;
         block->measured = block->has_bands ? 4 : block->dofs;
+        block_rest(block);
     }
     free(toml);
     if (stream) {

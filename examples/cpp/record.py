@@ -20,6 +20,8 @@ with (2,) in place of (3,), and in ``NAME.images`` the tip (2,) in place of feat
 Except of the axes the reference rests in the second tick, in which nodes and controllers of ROS
 begin to follow it.
 
+``configs`` has each configuration that comes with the package, with every key.
+
 ``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
 starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
 px; NaN is not known.
@@ -34,7 +36,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from tautscope import Config, Frame, HysteresisReduction, Report, axes
-from tautscope.config import ControlConfig, Profile, dump_config, load_config
+from tautscope.config import RIGS, ControlConfig, Profile, dump_config, load_config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Status
 from tautscope.loop.safety import DETECTORS, checksum
@@ -289,6 +291,12 @@ def record_tip(profile: Profile) -> Record:
     return record
 
 
+def write_configs(folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in RIGS:
+        (folder / f"{name}.toml").write_text(dump_config(load_config(name)), encoding="utf-8")
+
+
 def main() -> None:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
@@ -297,6 +305,7 @@ def main() -> None:
         record_axes(folder, profile)
         record_tip(profile).write(folder, f"tip_{profile}")
     record_frames(folder).write(folder, "frames")
+    write_configs(folder / "configs")
     print(f"{folder}: 60 s of profiles paper and best and of robots with [[dof]], 2 s of images")
 
 

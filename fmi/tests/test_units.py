@@ -15,7 +15,7 @@ import record
 from conftest import Builder
 from fmpy.validation import validate_fmu
 from fmu import CONFIG, DOFS, PERIOD, Unit, motion
-from tautscope import HysteresisReduction, MarkerDetector, Twin
+from tautscope import Config, HysteresisReduction, MarkerDetector, Twin, axes
 from tautscope.config import Profile
 from tautscope.loop.reduction import Status
 
@@ -151,6 +151,30 @@ def test_the_loop_of_two_degrees_of_freedom_finds_their_slack_as_in_python(
     found = unit.get_all("delta_plus") - unit.get_all("delta_minus")
     print(f"loop, {profile}: slack found {found}, simulated {record.SLACK}")
     np.testing.assert_allclose(found, record.SLACK, rtol=0.02)
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+@pytest.mark.parametrize("robot", [CONFIG, axes(2, width_limit=1.2, delta_plus=[0.1, 0.3])])
+def test_before_a_measurement_the_slack_is_the_expected_one(
+    profile: Profile, robot: Config, opened: Callable[..., Unit]
+) -> None:
+    config = robot.replace(profile=profile)
+    slack = HysteresisReduction(config).hysteresis
+    if slack is None:  # profile paper starts with its configured offsets
+        ends = np.array([(0.0, 0.1), (0.0, 0.3)] if config.dof else [(0.0, 0.0)] * 3).T
+    else:
+        ends = np.array([slack.centre - slack.half_width, slack.centre + slack.half_width])
+    unit = opened("loop", config)
+    for tick in range(3):
+        if tick == 2:
+            unit.reset()
+        np.testing.assert_array_equal(
+            [unit.get_all("delta_minus"), unit.get_all("delta_plus")], ends
+        )
+        assert np.isnan(unit.get_all("estimate")).all()
+        assert list(Status)[int(unit.get("status")[0])] is Status.NO_MARKERS
+        if tick == 0:
+            unit.step(0.0)
 
 
 def test_the_two_units_together_are_the_loop_on_the_twin(opened: Callable[..., Unit]) -> None:

@@ -1,5 +1,6 @@
 """Defaults and ranges of the Rust crates and of the C interface are those of Python."""
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,8 +23,9 @@ def defaults() -> str:
     return dump_config(axes(1, width_limit=1.0))
 
 
-def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, list[float]]]:
-    """Key, least and largest value of the numbers whose type has an upper limit."""
+def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, Any]]:
+    """Key, least and largest value of the numbers whose type has an upper limit; of a list of
+    numbers, those of each that it may have."""
     match kind:
         case types.StructType(fields=fields):
             for field in fields:
@@ -40,6 +42,10 @@ def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, list[float]]]:
             yield from bounds(path, item)
         case types.VarTupleType(item_type=types.StructType() as item):
             yield from bounds(path, item)
+        case types.VarTupleType(
+            item_type=types.FloatType(ge=float() | int() as low), max_length=int() as most
+        ):
+            yield path, [[float(low), math.inf]] * most
 
 
 def limits() -> str:

@@ -114,7 +114,7 @@ impl AxesSettings {
     ) -> Result<core::LoopSettings<N>, core::ConfigError> {
         let dofs: [&AxisSettings; N] = std::array::from_fn(|index| &self.dof[index]);
         for dof in dofs {
-            dof.check()?;
+            dof.check(false)?;
         }
         let group = std::array::from_fn(|index| {
             let same = |other: &&AxisSettings| other.friction == dofs[index].friction;
@@ -177,28 +177,41 @@ impl AxesSettings {
 }
 
 impl AxisSettings {
-    /// What the blocks of the core do not check.
-    fn check(&self) -> Result<(), core::ConfigError> {
+    /// What the blocks of the core do not check, or of which they would not name the degree of freedom.
+    pub(crate) fn check(&self, is_length: bool) -> Result<(), core::ConfigError> {
         let width = self.width_limit;
         let positive = [
             ("width_limit", width),
             ("speed", self.speed()),
             ("command_speed", self.command_speed()),
+            ("expected_width", self.expected_width.unwrap_or(width)),
+            ("lever", self.lever),
         ];
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(error(name, value, "a finite number above 0"));
             }
         }
-        let span = self.range.map_or(width, |(low, high)| high - low);
-        if !(span > 0.0 && span <= MOST_RANGE * width) {
-            let allowed = "from least to largest, above 0 and at most 100 width_limit; in m and rad, not mm and degrees";
-            return Err(error("range", span, allowed));
+        // A slack of more than a metre is one in millimetres.
+        if is_length && width > 1.0 {
+            return Err(error("width_limit", width, "at most 1 m"));
         }
-        if self.expected_width.is_some_and(|own| own > width) {
-            return Err(error("expected_width", width, "a width_limit not below it"));
+        if is_length && self.speed() > 10.0 {
+            return Err(error("speed", self.speed(), "at most 10 m/s"));
         }
-        Ok(())
+        if let Some((low, high)) = self.range
+            && !(high > low && high - low <= MOST_RANGE * width)
+        {
+            let allowed =
+                "above range[0], by at most 100 width_limit; in m and rad, not mm and degrees";
+            return Err(error("range[1]", high, allowed));
+        }
+        if let Some(expected) = self.expected_width
+            && expected > width
+        {
+            return Err(error("expected_width", expected, "at most width_limit"));
+        }
+        core::Play::new(self.delta_minus, self.delta_plus).map(|_| ())
     }
 
     fn speed(&self) -> f64 {

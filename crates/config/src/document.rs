@@ -1,13 +1,13 @@
 //! The configuration as text: TOML, in which missing keys have their defaults.
 
-use std::fmt;
-
 use serde::de::DeserializeOwned;
 use tautscope_core as core;
 use toml::{Table, Value};
 
 use crate::any_loop::{AnyLoop, Selection};
-use crate::axes::AxesSettings;
+use crate::axes::{AxesSettings, AxisSettings};
+use crate::error::Error;
+use crate::ranges::{Number, Ranges};
 
 /// A configuration with every key that the loop and the marker detection read.
 #[derive(Debug, Clone)]
@@ -25,34 +25,8 @@ pub struct Dof {
     pub unit: String,
 }
 
-/// Why a text is no configuration: the key, what came, and what may come.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Error(String);
-
-impl fmt::Display for Error {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        to.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Error {}
-
-impl From<core::ConfigError> for Error {
-    fn from(error: core::ConfigError) -> Self {
-        Self(error.to_string())
-    }
-}
-
-impl From<toml::de::Error> for Error {
-    fn from(error: toml::de::Error) -> Self {
-        Self(format!("configuration: {error}"))
-    }
-}
-
 /// The defaults, with a degree of freedom of `[[dof]]`; written by `tests/config/test_rust_defaults.py`.
 const DEFAULTS: &str = include_str!("defaults.toml");
-/// Ranges of the numbers; written by the same test.
-const RANGES: &str = include_str!("ranges.toml");
 /// Keys of `[[dof]]` without a default.
 const OPTIONAL: [&str; 6] = [
     "name",
@@ -78,16 +52,16 @@ const OF_ARTICLE: [&str; 11] = [
 ];
 /// Sections that a loop with `[[dof]]` reads.
 const OF_AXES: [&str; 5] = ["control", "safety", "law", "estimation", "measurement"];
-/// Sections without defaults that only Python reads.
-const OF_PYTHON: [&str; 2] = ["drives", "actuators"];
+/// Most characters of a name, as in `python/tautscope/config/axes.py`.
+const MOST_CHARACTERS: usize = 32;
 
 impl Configuration {
     /// A configuration from TOML: of the article's instrument, or with `[[dof]]` of a robot of yours.
     ///
     /// # Errors
-    /// The text is not TOML, a key is unknown or, with `[[dof]]`, of another instrument, or a degree of freedom has no name or a wrong
-    /// unit; or a number is not finite, or out of its range and not named in `safety.unusual`. Other values are checked where they are
-    /// read.
+    /// The text is not TOML, a key is unknown, of Python only or, with `[[dof]]`, of another instrument, or a degree of freedom has no
+    /// name or a wrong unit; or a number is not finite, or out of its range and not named in `safety.unusual`. Other values are checked
+    /// where they are read.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let mut given: Table = toml::from_str(text)?;
         let mut table: Table = toml::from_str(DEFAULTS)?;
@@ -111,7 +85,9 @@ impl Configuration {
             let name = name.as_str();
             match table.get_mut(name) {
                 Some(default) if !default.is_table() => *default = own,
-                _ if OF_PYTHON.contains(&name) => {}
+                // It has no defaults, and only Python reads it.
+                _ if name == "drives" => {}
+                _ if name == "actuators" => check_actuators(&own)?,
                 None => return Err(unknown(name)),
                 Some(_) if has_axes && name == "kinematics" => check_kinematics(&own)?,
                 Some(section) if read.contains(&name) => {
@@ -128,12 +104,67 @@ impl Configuration {
             let names = [("insertion", "m"), ("rotation", "rad"), ("bending", "rad")];
             names.map(|(name, unit)| Dof::new(name, unit)).into()
         };
-        let ranges: Ranges = toml::from_str(RANGES)?;
-        let unusual = ranges.named(&table)?;
-        for (name, value) in &table {
-            ranges.check(value, name, &unusual)?;
+        Ranges::new()?.check(&table)?;
+        let configuration = Self { table, dofs };
+        configuration.check()?;
+        Ok(configuration)
+    }
+
+    /// Relations between values, of which an error of the core would not name the degree of freedom.
+    fn check(&self) -> Result<(), Error> {
+        if !self.has_axes() {
+            return self.check_article();
         }
-        Ok(Self { table, dofs })
+        for (index, entry) in self.table["dof"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .enumerate()
+        {
+            let path = format!("dof[{index}].");
+            let dof: AxisSettings = entry
+                .clone()
+                .try_into()
+                .map_err(|error| Error::of_value(&error, &path))?;
+            dof.check(entry["unit"].as_str() == Some("m"))
+                .map_err(|error| Error(format!("{path}{error}")))?;
+        }
+        let Delays {
+            control,
+            measurement,
+        } = self.read()?;
+        for (index, delay) in measurement.delays.iter().enumerate() {
+            if *delay > control.history {
+                return Err(Error(format!(
+                    "measurement.delays[{index}]: got {delay}, expected at most control.history = {}",
+                    control.history
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_article(&self) -> Result<(), Error> {
+        for Dof { name, .. } in &self.dofs {
+            let dof: core::DofSettings = self.table[name]
+                .clone()
+                .try_into()
+                .map_err(|error| Error::of_value(&error, &format!("{name}.")))?;
+            check_dof(&dof).map_err(|error| Error(format!("{name}.{error}")))?;
+        }
+        let Safety { safety } = self.read()?;
+        for (index, (low, high)) in safety.command_travel.iter().enumerate() {
+            if low >= high {
+                return Err(Error(format!(
+                    "safety.command_travel[{index}]: got [{low}, {high}], expected the lower limit, then the upper"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn has_axes(&self) -> bool {
+        self.table.contains_key("dof")
     }
 
     /// The degrees of freedom in the order of every array.
@@ -155,12 +186,71 @@ impl Configuration {
     /// A value is of the wrong kind or out of range.
     pub fn build(&self) -> Result<AnyLoop, Error> {
         let selection: Selection = self.read()?;
-        Ok(if selection.has_axes() {
-            self.read::<AxesSettings>()?.build(true)?
+        let made = if selection.has_axes() {
+            self.read::<AxesSettings>()?.build(true)
         } else {
-            selection.build_bands(&self.read()?)?
-        })
+            selection.build_bands(&self.read()?)
+        };
+        made.map_err(|error| self.locate(error))
     }
+
+    /// An error of the core with the key from the root: the first with its name and value, else with its name.
+    pub fn locate(&self, error: core::ConfigError) -> Error {
+        let read: &[&str] = if self.has_axes() {
+            &OF_AXES
+        } else {
+            &OF_ARTICLE
+        };
+        let mut numbers = Vec::new();
+        for (name, value) in &self.table {
+            if name == "dof" || read.contains(&name.as_str()) {
+                Number::collect(value, name.clone(), name.clone(), None, &mut numbers);
+            }
+        }
+        numbers.retain(|number| number.key.rsplit('.').next() == Some(error.field));
+        #[expect(clippy::float_cmp, reason = "the value of the table")]
+        let same = numbers.iter().find(|number| number.value == error.value);
+        let path = same
+            .or(numbers.first())
+            .map_or(error.field, |own| &own.path);
+        let core::ConfigError { value, allowed, .. } = error;
+        Error(format!("{path}: got {value}, expected {allowed}"))
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct Delays {
+    control: core::ControlSettings,
+    measurement: Measurement,
+}
+
+#[derive(serde::Deserialize)]
+struct Measurement {
+    delays: Vec<f64>,
+}
+
+#[derive(serde::Deserialize)]
+struct Safety {
+    safety: core::SafetySettings,
+}
+
+fn check_dof(dof: &core::DofSettings) -> Result<(), core::ConfigError> {
+    let width = dof.expected_width;
+    if width <= 0.0 {
+        return Err(core::ConfigError {
+            field: "expected_width",
+            value: width,
+            allowed: "above 0",
+        });
+    }
+    core::Play::new(dof.delta_minus, dof.delta_plus)?;
+    core::Compensator::new(dof.free_gain, dof.gain_limit)?.with_recovery(dof.recovery)?;
+    core::Estimator::new(
+        dof.update_distance,
+        dof.contact_tolerance,
+        dof.smoothing_factor,
+    )?;
+    Ok(())
 }
 
 impl Dof {
@@ -176,19 +266,25 @@ fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Er
         default.remove(key);
     }
     let (mut all, mut dofs) = (Vec::new(), Vec::<Dof>::new());
-    for own in entries {
+    for (index, own) in entries.into_iter().enumerate() {
+        let path = format!("dof[{index}]");
         let mut entry = Value::Table(default.clone());
-        merge(&mut entry, &own, "dof", &OPTIONAL, true)?;
+        merge(&mut entry, &own, &path, &OPTIONAL, true)?;
+        if entry.get("width_limit").is_none() {
+            return Err(Error(format!(
+                "{path}.width_limit: expected a value: it has no default"
+            )));
+        }
         let text = |key| entry.get(key).and_then(Value::as_str).unwrap_or_default();
         let (name, unit) = (text("name"), text("unit"));
-        if name.is_empty() || name.contains('\0') || dofs.iter().any(|dof| dof.name == name) {
+        if !is_name(name) || dofs.iter().any(|dof| dof.name == name) {
             return Err(Error(format!(
-                "dof.name: got {name:?}, expected a name used once"
+                "{path}.name: got {name:?}, expected a name used once, of 1 to {MOST_CHARACTERS} of a-z, 0-9 and _, a-z first"
             )));
         }
         if !["m", "rad"].contains(&unit) {
             return Err(Error(format!(
-                "dof.unit: got {unit:?}, expected \"m\" or \"rad\""
+                "{path}.unit: got {unit:?}, expected \"m\" or \"rad\""
             )));
         }
         dofs.push(Dof::new(name, unit));
@@ -197,82 +293,21 @@ fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Er
     Ok((Value::Array(all), dofs))
 }
 
-/// Least and largest values by key: a pair, or one for each item of a list.
-#[derive(serde::Deserialize)]
-struct Ranges {
-    /// Of the keys that `safety.unusual` may name.
-    usual: Table,
-    always: Table,
+/// Whether a text is `Name` of `python/tautscope/config/axes.py`.
+fn is_name(text: &str) -> bool {
+    let is_allowed = |one| matches!(one, 'a'..='z' | '0'..='9' | '_');
+    text.len() <= MOST_CHARACTERS
+        && text.starts_with(|first: char| first.is_ascii_lowercase())
+        && text.chars().all(is_allowed)
 }
 
-impl Ranges {
-    /// The keys that `safety.unusual` names.
-    fn named(&self, table: &Table) -> Result<Vec<String>, Error> {
-        let names = table.get("safety").and_then(|own| own.get("unusual"));
-        let names: Vec<String> = names.cloned().map_or(Ok(Vec::new()), Value::try_into)?;
-        match names.iter().find(|name| !self.usual.contains_key(*name)) {
-            Some(name) => Err(Error(format!(
-                "safety.unusual: got {name:?}, expected the key of a number with a usual range"
-            ))),
-            None => Ok(names),
-        }
-    }
-
-    /// No comparison with a number that is not finite would hold, so that each check with it would be off; a wrong unit does the same.
-    fn check(&self, value: &Value, name: &str, unusual: &[String]) -> Result<(), Error> {
-        match value {
-            Value::Table(own) => own
-                .iter()
-                .try_for_each(|(key, value)| self.check(value, &format!("{name}.{key}"), unusual)),
-            Value::Array(all) if all.iter().all(Value::is_table) => all
-                .iter()
-                .try_for_each(|value| self.check(value, name, unusual)),
-            _ if unusual.iter().any(|key| key == name) => check_number(value, name, None, ""),
-            _ => match self.usual.get(name) {
-                None => check_number(value, name, self.always.get(name), ""),
-                range => check_number(value, name, range, ", or named in safety.unusual"),
-            },
-        }
-    }
-}
-
-/// A number, or each of a list.
-fn check_number(
-    value: &Value,
-    name: &str,
-    range: Option<&Value>,
-    waiver: &str,
-) -> Result<(), Error> {
-    #[expect(clippy::cast_precision_loss, reason = "compared with a limit")]
-    let number = match value {
-        Value::Array(all) => {
-            let ranges = range.and_then(Value::as_array);
-            let of_items = ranges.filter(|ranges| ranges.iter().all(Value::is_array));
-            return all.iter().enumerate().try_for_each(|(index, value)| {
-                let own = of_items.map_or(range, |ranges| ranges.get(index));
-                check_number(value, name, own, waiver)
-            });
-        }
-        Value::Float(number) => *number,
-        Value::Integer(number) => *number as f64,
-        _ => return Ok(()),
-    };
-    if !number.is_finite() {
-        return Err(Error(format!(
-            "{name}: got {number}, expected a finite number"
-        )));
-    }
-    let Some((low, high)) = range.and_then(|range| range.clone().try_into::<(f64, f64)>().ok())
-    else {
+fn check_actuators(own: &Value) -> Result<(), Error> {
+    if own.as_table().is_some_and(Table::is_empty) {
         return Ok(());
-    };
-    if (low..=high).contains(&number) {
-        Ok(())
-    } else {
-        Err(Error(format!(
-            "{name}: got {number}, expected {low} to {high}{waiver}"
-        )))
     }
+    Err(Error(
+        "actuators: got keys, expected none: rigs whose motors are not the degrees of freedom are in Python only".into(),
+    ))
 }
 
 fn check_kinematics(own: &Value) -> Result<(), Error> {
@@ -285,7 +320,7 @@ fn check_kinematics(own: &Value) -> Result<(), Error> {
     }
 }
 
-/// Takes the values of a section.
+/// Takes the values of a section; one that is empty among the defaults has keys of the user's.
 fn merge(
     section: &mut Value,
     own: &Value,
@@ -299,6 +334,7 @@ fn merge(
             own.type_str()
         )));
     };
+    let is_free = section.is_empty();
     for (key, value) in own {
         let default = section.get_mut(key);
         let is_of_article = key == "frozen_travel"
@@ -315,7 +351,13 @@ fn merge(
             Some(default) if default.is_table() => {
                 merge(default, value, &format!("{name}.{key}"), &[], has_axes)?;
             }
-            None if !optional.contains(&key.as_str()) => {
+            Some(default) if kind(default) != kind(value) => {
+                let found = value.as_str().map(|text| format!("{text:?}"));
+                let found = found.unwrap_or_else(|| value.type_str().into());
+                let kind = kind(default);
+                return Err(Error(format!("{name}.{key}: got {found}, expected {kind}")));
+            }
+            None if !is_free && !optional.contains(&key.as_str()) => {
                 return Err(unknown(&format!("{name}.{key}")));
             }
             _ => {
@@ -324,6 +366,14 @@ fn merge(
         }
     }
     Ok(())
+}
+
+/// The type of a value; a number is a whole one or not.
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Integer(_) | Value::Float(_) => "a number",
+        other => other.type_str(),
+    }
 }
 
 fn unknown(name: &str) -> Error {

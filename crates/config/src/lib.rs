@@ -4,8 +4,14 @@ mod any_loop;
 mod axes;
 #[cfg(feature = "toml")]
 mod document;
+#[cfg(feature = "toml")]
+mod error;
+#[cfg(feature = "toml")]
+mod ranges;
 
 pub use any_loop::{AnyLoop, Profile, Selection};
 pub use axes::{AxesSettings, AxisSettings, MOST_RANGE, SPEED};
 #[cfg(feature = "toml")]
-pub use document::{Configuration, Dof, Error};
+pub use document::{Configuration, Dof};
+#[cfg(feature = "toml")]
+pub use error::Error;

@@ -76,16 +76,24 @@ fn degrees_of_freedom_have_names_units_and_defaults() {
 
 const ONE: &str = "[[dof]]\nname = \"a\"\nwidth_limit = 1.0\n";
 
+/// Each text is refused with these words.
+fn check_errors(all: &[(String, &str)]) {
+    for (text, words) in all {
+        let found = error(text);
+        assert!(found.contains(words), "{text}: {found}");
+    }
+}
+
 #[test]
 fn errors_name_the_key() {
     let dof = |keys: &str| format!("{ONE}{keys}");
-    let nine: String = (0..9)
-        .map(|index| ONE.replace("\"a\"", &format!("\"{index}\"")))
-        .collect();
-    for (text, words) in [
+    check_errors(&[
         ("=".into(), "configuration: "),
-        ("profile = \"worst\"".into(), "`worst`"),
-        (format!("profile = \"worst\"\n{ONE}"), "`worst`"),
+        (
+            "profile = \"worst\"".into(),
+            "profile: unknown variant `worst`",
+        ),
+        (format!("profile = \"worst\"\n{ONE}"), "profile: unknown"),
         ("[saftey]".into(), "saftey: unknown key"),
         (dof("[saftey]"), "saftey: unknown key"),
         ("law.tip_gian = 3.0".into(), "law.tip_gian: unknown key"),
@@ -98,53 +106,163 @@ fn errors_name_the_key() {
             "camera.camera_from_guide.rot: unknown key",
         ),
         ("law = 3".into(), "law: got integer, expected a table"),
-        ("law.tip_gain = \"three\"".into(), "tip_gain"),
-        ("law.tip_gain = 0.5".into(), "tip_gain: got 0.5"),
+        (
+            "camera.source.options = 3".into(),
+            "camera.source.options: got integer, expected a table",
+        ),
+        (
+            "law.tip_gain = \"three\"".into(),
+            "law.tip_gain: got \"three\", expected a number",
+        ),
+        (
+            "safety.off = [\"fozen\"]".into(),
+            "safety.off: unknown variant `fozen`",
+        ),
+        ("law.tip_gain = 0.5".into(), "law.tip_gain: got 0.5"),
         (
             "law.tip_gain = nan".into(),
             "law.tip_gain: got NaN, expected a finite number",
         ),
         (
             "camera.camera_from_guide.rotation = [0.1, inf, 0.0]".into(),
-            "camera.camera_from_guide.rotation: got inf",
+            "camera.camera_from_guide.rotation[1]: got inf",
         ),
         (
             "vision.least_inside = nan".into(),
             "vision.least_inside: got NaN",
         ),
         (
-            "control.history = 60".into(),
-            "history: got 60, expected at most 1024 control periods",
+            "control.period = 0.001".into(),
+            "control.history: got 2, expected at most 1024 control periods",
         ),
-        (dof("[control]\nhistory = 2e6"), "history: got 2000000"),
+        (
+            dof("[control]\nperiod = 0.001"),
+            "control.history: got 2, expected at most 1024 control periods",
+        ),
         (
             dof("[control]\nhistory = 0.2"),
-            "frame_age: got 0.3, expected at most control.history",
+            "safety.frame_age: got 0.3, expected at most control.history",
         ),
-        (dof("[control]\nperiod = 0.1"), "stall: got 0.1"),
-        (dof("range = [-inf, inf]"), "dof.range: got -inf"),
-        (dof("[law]\ntip_gain = -1"), "tip_gain: got -1"),
-        (dof("[control]\nperiod = 0"), "period: got 0"),
+        (dof("[control]\nperiod = 0.1"), "safety.stall: got 0.1"),
+        (dof("[control]\nperiod = 0"), "control.period: got 0"),
+        (
+            "rotation.delta_plus = -1.0".into(),
+            "rotation.delta_minus: got 0, expected at most delta_plus",
+        ),
+        (
+            "rotation.free_gain = 6.0".into(),
+            "rotation.free_gain: got 6, expected at least 1, at most gain_limit",
+        ),
+        (
+            "bending.smoothing_factor = 1.0".into(),
+            "bending.smoothing_factor: got 1",
+        ),
+        (
+            "safety.unusual = [\"rotation.expected_width\"]\nrotation.expected_width = 0".into(),
+            "rotation.expected_width: got 0, expected above 0",
+        ),
+        (
+            "safety.unusual = [\"rotation.start_deviation\"]\nrotation.start_deviation = 0".into(),
+            "rotation.start_deviation: got 0",
+        ),
+        (
+            "safety.unusual = [\"safety.width_limit\"]\nsafety.width_limit = [0.01, -2.6, 1.5]"
+                .into(),
+            "safety.width_limit[1]: got -2.6",
+        ),
+        (
+            "safety.command_travel = [[0, 0.2], [0, -1], [-4, 4]]".into(),
+            "safety.command_travel[1]: got [0, -1], expected the lower limit, then the upper",
+        ),
+    ]);
+}
+
+#[test]
+fn errors_name_the_degree_of_freedom() {
+    let dof = |keys: &str| format!("{ONE}{keys}");
+    let second = |keys: &str| dof(&format!("{}{keys}", ONE.replace("\"a\"", "\"b\"")));
+    let nine: String = (0..9)
+        .map(|index| ONE.replace("\"a\"", &format!("\"a{index}\"")))
+        .collect();
+    check_errors(&[
         ("dof = 1".into(), "dof: got integer, expected [[dof]]"),
-        ("dof = [1]".into(), "dof: got integer, expected a table"),
-        (nine, "1 to 8 degrees of freedom"),
-        ("[[dof]]\nname = \"a\"".into(), "width_limit"),
-        ("[[dof]]\nwidth_limit = 1".into(), "dof.name: got \"\""),
+        ("dof = [1]".into(), "dof[0]: got integer, expected a table"),
+        (nine, "dof: got 9, expected 1 to 8 degrees of freedom"),
+        (
+            "[[dof]]\nname = \"a\"".into(),
+            "dof[0].width_limit: expected a value: it has no default",
+        ),
+        ("[[dof]]\nwidth_limit = 1".into(), "dof[0].name: got \"\""),
         (
             ONE.repeat(2),
-            "dof.name: got \"a\", expected a name used once",
+            "dof[1].name: got \"a\", expected a name used once",
         ),
-        (dof("widht = 3"), "dof.widht: unknown key"),
-        (dof("lever = \"long\""), "expected f64"),
-        (dof("range = [2, 1]"), "range"),
-        (dof("range = [-180, 180]"), "not mm and degrees"),
-        (dof("speed = -1"), "speed: got -1"),
-        (dof("expected_width = 2"), "expected_width"),
-        (dof("gain_limit = 0.5"), "gain"),
-        (dof("delta_minus = 1"), "delta"),
+        (second("widht = 3"), "dof[1].widht: unknown key"),
         (
-            dof("unit = \"mm\""),
-            "dof.unit: got \"mm\", expected \"m\" or \"rad\"",
+            second("lever = \"long\""),
+            "dof[1].lever: got \"long\", expected a number",
+        ),
+        (
+            second("range = [1, \"a\"]"),
+            "dof[1].range: invalid type: string \"a\", expected f64",
+        ),
+        (second("range = [-inf, inf]"), "dof[1].range[0]: got -inf"),
+        (
+            second("range = [1, -1]"),
+            "dof[1].range[1]: got -1, expected above range[0]",
+        ),
+        (second("range = [-180, 180]"), "not mm and degrees"),
+        (second("speed = -1"), "dof[1].speed: got -1"),
+        (second("speed = 0"), "dof[1].speed: got 0"),
+        (second("lever = 0"), "dof[1].lever: got 0"),
+        (
+            second("expected_width = 2"),
+            "dof[1].expected_width: got 2, expected at most width_limit",
+        ),
+        (
+            second("expected_width = -1"),
+            "dof[1].expected_width: got -1",
+        ),
+        (second("gain_limit = 0.5"), "dof[1].gain_limit: got 0.5"),
+        (
+            second("delta_minus = 1"),
+            "dof[1].delta_minus: got 1, expected at most delta_plus",
+        ),
+        (
+            second("unit = \"mm\""),
+            "dof[1].unit: got \"mm\", expected \"m\" or \"rad\"",
+        ),
+        (
+            second("").replace("1.0\n[[", "-1.0\n[["),
+            "dof[0].width_limit: got -1, expected 0 to 100",
+        ),
+        (
+            dof("unit = \"m\"").replace("1.0", "12"),
+            "dof[0].width_limit: got 12, expected at most 1 m",
+        ),
+        (
+            dof("unit = \"m\"\nspeed = 60"),
+            "dof[0].speed: got 60, expected at most 10 m/s",
+        ),
+        (
+            dof("[measurement]\ndelays = [0.0, -0.1]"),
+            "measurement.delays[1]: got -0.1, expected at least 0",
+        ),
+        (
+            dof("[measurement]\ndelays = [0, 0, 0, 0, 0.1]"),
+            "measurement.delays[4]: got 0.1, expected a list of at most 4",
+        ),
+        (
+            dof("[measurement]\ndelays = [0.0, 100.0]"),
+            "measurement.delays[1]: got 100, expected at most control.history = 2",
+        ),
+        (
+            dof("[actuators]\nmatrix = [[3.0]]"),
+            "actuators: got keys, expected none: rigs whose motors are not",
+        ),
+        (
+            "[actuators]\nmatrix = [[3.0]]".into(),
+            "actuators: got keys, expected none",
         ),
         (
             dof("[kinematics]\nkind = \"two_planes\""),
@@ -154,16 +272,13 @@ fn errors_name_the_key() {
             dof("[safety]\nwidth_limit = [1, 1, 1]"),
             "safety.width_limit: not used with [[dof]]",
         ),
-    ] {
-        let found = error(&text);
-        assert!(found.contains(words), "{text}: {found}");
-    }
+    ]);
 }
 
 #[test]
 fn numbers_have_the_ranges_of_python() {
     let dof = |keys: &str| format!("{ONE}{keys}");
-    for (text, words) in [
+    check_errors(&[
         (
             "vision.fit.edge_deviation = -1.0".into(),
             "vision.fit.edge_deviation: got -1, expected 0.0167 to 15, or named in safety.unusual",
@@ -174,11 +289,11 @@ fn numbers_have_the_ranges_of_python() {
         ),
         (
             "safety.width_limit = [12.0, 2.6, 1.5]".into(),
-            "safety.width_limit: got 12, expected 0.0004 to 0.36, or named in safety.unusual",
+            "safety.width_limit[0]: got 12, expected 0.0004 to 0.36, or named in safety.unusual",
         ),
         (
             "safety.command_travel = [[-0.1, 0.3], [-12.6, 722], [-4, 4]]".into(),
-            "safety.command_travel: got 722, expected -378 to 378",
+            "safety.command_travel[1][1]: got 722, expected -378 to 378",
         ),
         (
             "safety.good_frames = 151".into(),
@@ -192,12 +307,12 @@ fn numbers_have_the_ranges_of_python() {
             "safety.unusual = [\"safety.stal\"]".into(),
             "safety.unusual: got \"safety.stal\"",
         ),
-        (dof("lever = 101"), "dof.lever: got 101, expected 0 to 100"),
+        (
+            dof("lever = 101"),
+            "dof[0].lever: got 101, expected 0 to 100",
+        ),
         (dof("[safety]\nstall = 1e4"), "safety.stall: got 10000"),
-    ] {
-        let found = error(&text);
-        assert!(found.contains(words), "{text}: {found}");
-    }
+    ]);
 }
 
 #[test]
@@ -206,4 +321,47 @@ fn an_unusual_number_is_allowed_by_name() {
     assert!(Configuration::parse(stall).is_ok());
     let nan = stall.replace("1e4", "nan");
     assert!(error(&nan).contains("safety.stall: got NaN"));
+}
+
+#[test]
+fn names_are_those_of_python() {
+    let named = |name: &str| Configuration::parse(&ONE.replace("\"a\"", &format!("{name:?}")));
+    let longest = "a".repeat(32);
+    for name in ["a", "bend_x", "axis_1", &longest] {
+        assert!(named(name).is_ok(), "{name}");
+    }
+    for name in [
+        "a b",
+        "Bend",
+        "1",
+        "_a",
+        "ä",
+        "a\n",
+        "",
+        &format!("{longest}a"),
+    ] {
+        let found = named(name).err().map(|error| error.to_string());
+        assert!(
+            found.is_some_and(|found| found.starts_with("dof[0].name: got ")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn what_comes_with_the_package_is_read() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs");
+    let mut read = 0;
+    for file in std::fs::read_dir(folder).unwrap() {
+        let path = file.unwrap().path();
+        let text = std::fs::read_to_string(&path).unwrap();
+        if text.contains("two_planes") {
+            assert!(error(&text).starts_with("kinematics.kind: got \"two_planes\""));
+        } else if path.extension().is_some_and(|end| end == "toml") {
+            let made = Configuration::parse(&text).and_then(|own| own.build());
+            assert!(made.is_ok(), "{}: {:?}", path.display(), made.err());
+            read += 1;
+        }
+    }
+    assert!(read > 4);
 }

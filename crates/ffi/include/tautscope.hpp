@@ -157,8 +157,13 @@ inline TautscopeImage view(const cv::Mat &mat, TautscopePixelFormat format) {
 /// The text of a file. Throws `Error` if it cannot be read.
 inline std::string read_file(const std::string &path) {
     std::ifstream file(path, std::ios::binary);
-    std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    if (!file) {
+    std::string text;
+    std::array<char, 4096> part;
+    // Iterators would throw another exception for a folder.
+    while (file.read(part.data(), part.size()) || file.gcount() > 0) {
+        text.append(part.data(), static_cast<std::size_t>(file.gcount()));
+    }
+    if (!file.is_open() || file.bad()) {
         throw Error(TAUTSCOPE_RESULT_CONFIG, "File cannot be read: " + path);
     }
     return text;
@@ -470,7 +475,12 @@ class Estimator {
 public:
     explicit Estimator(const std::vector<TautscopeEstimatorSettings> &settings)
         : handle_(detail::create_each(&tautscope_estimator_create, settings)), minus_(settings.size()),
-          plus_(settings.size()) {}
+          plus_(settings.size()) {
+        for (std::size_t dof = 0; dof < settings.size(); ++dof) {
+            minus_[dof] = settings[dof].delta_minus;
+            plus_[dof] = settings[dof].delta_plus;
+        }
+    }
 
     /// Updates the offsets from a command (n,) and the output (n,) measured at the same instant; NaN for what was not measured.
     void update(Numbers command, Numbers measured) {
@@ -479,10 +489,10 @@ public:
                                          minus_.data(), plus_.data()));
     }
 
-    /// Negative contact offsets (n,) after the last update, input minus output.
+    /// Negative contact offsets (n,) after the last update, before it the first ones, input minus output.
     const Values &delta_minus() const noexcept { return minus_; }
 
-    /// Positive contact offsets (n,) after the last update, input minus output.
+    /// Positive contact offsets (n,) after the last update, before it the first ones, input minus output.
     const Values &delta_plus() const noexcept { return plus_; }
 
 private:

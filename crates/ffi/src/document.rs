@@ -130,7 +130,8 @@ pub fn detector_settings(
     let configuration = parsed(text)?;
     let document: DetectionDocument = configuration.read().map_err(wrong)?;
     let settings: core::Settings = configuration.read().map_err(wrong)?;
-    let model = settings.feature_model().map_err(wrong)?;
+    let model = settings.feature_model();
+    let model = model.map_err(|error| wrong(configuration.locate(error)))?;
     let size = &document.camera;
     let format = PixelFormat::named(&size.pixel_format)
         .and_then(|format| {

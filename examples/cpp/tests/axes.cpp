@@ -165,6 +165,8 @@ int article() {
     for (std::size_t axis : {0, 1}) {
         wrong += !(std::abs(found.delta_plus()[axis] - found.delta_minus()[axis] - 2 * half[axis]) < 0.05);
     }
+    const tautscope::Estimator first({{0.02, 0.4, 0.25, -0.1, 0.3}});
+    wrong += first.delta_minus()[0] != -0.1 || first.delta_plus()[0] != 0.3;
     wrong += refuses([&] { both.step({0.1}); }, "dofs: got 1, expected 2");
     wrong += refuses([&] { both.set_offsets({0.2, 0.2}, {0.1, 0.1}); }, "delta_minus");
     wrong += refuses([&] { found.update({0.1, 0.2}, {0.1}); }, "dofs");

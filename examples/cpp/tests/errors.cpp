@@ -53,8 +53,9 @@ TautscopeResult create(const std::string &toml) {
 void check_configuration(const std::string &toml) {
     FAILS(create(replaced(toml, "[control]", "[controls]")), CONFIG, "control");
     FAILS(create(replaced(toml, "gain_limit", "gain_limt")), CONFIG, "insertion.gain_limt: unknown key");
-    FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = -1.0")), CONFIG, "period: got -1");
-    FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = \"fast\"")), CONFIG, "fast");
+    FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = -1.0")), CONFIG, "control.period: got -1");
+    FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = \"fast\"")), CONFIG,
+          "control.period: got \"fast\", expected a number");
     const auto detector = [](const std::string &text) { return thrown([&] { tautscope::Detector created(text); }); };
     FAILS(detector(replaced(toml, "pixel_format = \"bgr\"", "pixel_format = \"hsv\"")), CONFIG, "camera.pixel_format");
     FAILS(detector(replaced(toml, "smoothing = ", "smoothing = 9")), CONFIG, "smoothing");
@@ -197,7 +198,9 @@ int main(int count, char **arguments) {
     check_features(toml);
     check_image(toml);
     check_supervision(toml);
-    EXPECT(thrown([] { tautscope::read_file("not/a/file"); }) == TAUTSCOPE_RESULT_CONFIG);
+    for (const char *path : {"not/a/file", "."}) {
+        EXPECT(thrown([&] { tautscope::read_file(path); }) == TAUTSCOPE_RESULT_CONFIG);
+    }
     std::printf("%d failures\n", failures);
     return failures > 0;
 }

@@ -91,7 +91,9 @@ int main(int count, char **arguments) {
         S.phase = OUTPUTS_PHASE;
         mdlOutputs(&S, 0);
         compare(S.outputs.signal[COMMAND], now + 3 + n, n);
-        if (image > 0) {
+        if (image == 0) {
+            require(isnan(S.outputs.signal[STATE_ESTIMATE][n - 1]), "an estimate before the first measurement");
+        } else {
             const double *last = image_rows + IMAGE * (image - 1);
             compare(S.outputs.signal[STATE], last + answers, 1);
             compare(S.outputs.signal[STATE_ESTIMATE], last + answers + 3, n);

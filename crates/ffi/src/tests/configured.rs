@@ -10,7 +10,7 @@ use std::mem::MaybeUninit;
 use std::path::Path;
 use std::ptr::null_mut;
 
-use crate::document::detector_settings;
+use crate::document::{LoopDocument, detector_settings};
 use crate::image_update::{tautscope_loop_on_features, tautscope_loop_predict_state};
 use crate::reduction::{tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_step};
 use crate::result::TautscopeResult;
@@ -25,6 +25,22 @@ use crate::types::{
 fn recorded(file: &str) -> Vec<u8> {
     let folder = std::env::var_os("TAUTSCOPE_RECORDINGS").unwrap();
     std::fs::read(Path::new(&folder).join(file)).unwrap()
+}
+
+#[test]
+#[ignore = "needs the folder of record.py in TAUTSCOPE_RECORDINGS"]
+fn what_python_writes_of_its_configurations_is_read() {
+    let folder = std::env::var_os("TAUTSCOPE_RECORDINGS").unwrap();
+    let files = std::fs::read_dir(Path::new(&folder).join("configs")).unwrap();
+    let mut read = 0;
+    for path in files.map(|file| file.unwrap().path()) {
+        let text = std::fs::read(&path).unwrap();
+        let is_of_python = String::from_utf8_lossy(&text).contains("\"two_planes\"");
+        let is_read = LoopDocument::new(&text).is_ok();
+        assert_eq!(is_read, !is_of_python, "{}", path.display());
+        read += u32::from(is_read);
+    }
+    assert!(read > 4);
 }
 
 #[test]
