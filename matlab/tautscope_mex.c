@@ -81,6 +81,14 @@ static const double *numbers(const mxArray *value, size_t count, const char *nam
 
 static double number(const mxArray *value, const char *name) { return *numbers(value, 1, name); }
 
+static uint32_t whole(const mxArray *value, const char *name) {
+    const double found = number(value, name);
+    if (!(found >= 0.0 && found <= UINT32_MAX && found == floor(found))) {
+        mexErrMsgIdAndTxt("tautscope:Signal", "%s: got %g, expected a whole number from 0 on", name, found);
+    }
+    return (uint32_t)found;
+}
+
 static char *text(const mxArray *value, const char *name) {
     if (!mxIsChar(value)) {
         mexErrMsgIdAndTxt("tautscope:Signal", "%s: got class %s, expected a row of characters", name, mxGetClassName(value));
@@ -234,7 +242,7 @@ static mxArray *on_measurement(Slot *slot, int count, const mxArray *arguments[]
     TautscopeMeasurement measurement = {.count = values,
                                         .values = numbers(arguments[0], values, "values"),
                                         .captured_at = number(arguments[1], "captured_at"),
-                                        .sensor = (uint32_t)number(arguments[3], "sensor")};
+                                        .sensor = whole(arguments[3], "sensor")};
     if (mxGetNumberOfElements(arguments[2]) > 0) {
         measurement.covariance = numbers(arguments[2], values * values, "covariance");
     }
@@ -242,7 +250,7 @@ static mxArray *on_measurement(Slot *slot, int count, const mxArray *arguments[]
         check(tautscope_loop_on_tip(slot->loop, &measurement, &report));
     } else {
         Model model = {.function = mxDuplicateArray(arguments[4]), .dofs = slot->dofs, .count = values};
-        measurement.point = (uint32_t)number(arguments[5], "point");
+        measurement.point = whole(arguments[5], "point");
         const TautscopeResult result = tautscope_loop_on_measurement(slot->loop, &measurement, predict, &model, &report);
         if (model.message[0]) {
             mexErrMsgIdAndTxt("tautscope:Signal", "%s", model.message);

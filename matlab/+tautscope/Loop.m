@@ -47,6 +47,9 @@ classdef Loop < handle
             % One control tick: the command (1xn) for a reference (n numbers).
             %
             % made_at is when the reference was made [s], if known: a reference that is too old stops the motion.
+            if nargin < 3  % `time` is a function of Octave, too
+                error('tautscope:Signal', 'time: got nothing, expected loop.step(reference, time) with a time in s');
+            end
             if nargin < 4
                 made_at = NaN;
             end
@@ -65,6 +68,9 @@ classdef Loop < handle
             % Image update with an image as imread gives it: height x width x 3 of class uint8, R, G, B.
             %
             % It takes some ms, in which the loop cannot step.
+            if nargin < 3  % `image` is a function, too
+                error('tautscope:Signal', 'image, captured_at: expected loop.on_frame(image, captured_at)');
+            end
             report = tautscope_mex('on_frame', self.serial, self.toml, image, captured_at);
         end
 
@@ -135,6 +141,9 @@ classdef Loop < handle
 
         function raise_flag(self, flag)
             % Report a condition that only the rig can detect: 'drive_fault' stops the motion until engage.
+            if nargin < 2  % `flag` is a function, too
+                error('tautscope:Signal', 'flag: got nothing, expected loop.raise_flag(name) with the name of a flag');
+            end
             tautscope_mex('raise_flag', self.serial, flag);
         end
     end

@@ -11,6 +11,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", ["config/node.yaml"]),
         (f"share/{NAME}/launch", ["launch/node.launch.py"]),
     ],
     zip_safe=True,

@@ -94,6 +94,7 @@ def test_axes_do_not_influence_each_other() -> None:
     u, several, found = references(2000), compensator(), estimator()
     commands = several.run(u)
     results = found.run(commands, tips(commands))
+    assert isinstance(results, tuple)
     stepwise = estimator()
     for axis in range(3):
         alone = Compensator(

@@ -8,13 +8,31 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tautscope import Config, HysteresisReduction, Sample, Tip, axes
+from tautscope import (
+    Camera,
+    Compensator,
+    Config,
+    Estimator,
+    HysteresisReduction,
+    Instrument,
+    MarkerDetector,
+    Play,
+    PlayRig,
+    Pose,
+    Sample,
+    Tip,
+    axes,
+    run_experiment,
+)
 from tautscope.config import from_document
-from tautscope.errors import FieldError
+from tautscope.errors import FieldError, SignalError
 from tautscope.loop.rig import check_sample
 from tautscope.loop.signal_checks import check_covariance
 
 NAN, EYE = float("nan"), np.eye(3)
+HUGE = 10**400
+"""No float has this value."""
+FILE: Any = "rig.toml"
 
 
 class NoTip:
@@ -38,6 +56,25 @@ def loop() -> HysteresisReduction:
     made = HysteresisReduction(planes())
     made.step([0.0, 0.0], 0.0)
     return made
+
+
+def camera() -> Camera:
+    return Camera(fx=500, fy=500, cx=320, cy=240, distortion=(0,) * 8)
+
+
+def instrument() -> Instrument:
+    lengths = {"bending_length": 0.02, "marker_a": 0.005, "marker_b": 0.015}
+    return Instrument(**lengths, radius=0.001, band_length=0.002)
+
+
+def compensator(**settings: Any) -> Compensator:
+    offsets = {"delta_minus": -0.1, "delta_plus": 0.1}
+    return Compensator(**{"free_gain": 5, "gain_limit": 5, **offsets, **settings})
+
+
+def estimator() -> Estimator:
+    shares = {"contact_tolerance": 0.4, "smoothing_factor": 0.25}
+    return Estimator(update_distance=0.02, **shares, delta_minus=-0.1, delta_plus=0.1)
 
 
 def sample(**parts: Any) -> Sample:
@@ -83,11 +120,34 @@ CONFIGURATIONS: list[Case] = [
     (lambda: kind("test_wrong_input:NoTip"), "kinematics.kind", "NoTip", "the method tip(q)"),
     (lambda: HysteresisReduction(one().replace(**{"kinematics.kind": "two_planes"})),
      "dof.name", "'a'", "bend_x"),
+    (lambda: HysteresisReduction(FILE), "config", "'rig.toml'", "load_config(path)"),
+    (lambda: MarkerDetector(FILE), "config", "'rig.toml'", "load_config(path)"),
+    (lambda: PlayRig(FILE), "config", "'rig.toml'", "load_config(path)"),
+    (lambda: run_experiment(PlayRig(planes()), len, FILE),  # type: ignore[arg-type]
+     "config", "'rig.toml'", "load_config(path)"),
+]  # fmt: skip
+ARRAYS: list[Case] = [
+    (lambda: camera().project([1, 2, 3]), "points", "[1, 2, 3]", "an array (n, 3)"),
+    (lambda: camera().jacobian("a"), "point", "'a'", "an array (3,)"),
+    (lambda: Camera(fx=1, fy=1, cx=0, cy=0, distortion=(0,) * 5),  # type: ignore[arg-type]
+     "distortion", "5 values", "8 values"),
+    (lambda: instrument().markers([[0.0] * 3]), "state", "[[0.0", "an array (3,)"),
+    (lambda: instrument().jacobian([HUGE, 0, 0]), "state", "[1000", "an array (3,)"),
+    (lambda: Play(delta_minus=0, delta_plus=1).run([[1]]), "inputs", "[[1]]", "an array (n,)"),
+    (lambda: compensator(free_gain=HUGE), "free_gain", "1000", "a float, or an array"),
+    (lambda: compensator(recovery="a"), "recovery", "'a'", "a float, or an array"),
+    (lambda: compensator(delta_plus=[[1]]), "delta_plus", "1 values", "a float, or an array"),
+    (lambda: compensator().step("a"), "reference", "'a'", "a float, or an array"),
+    (lambda: compensator().run("a"), "references", "'a'", "numbers"),
+    (lambda: estimator().update(0.0, "a"), "measured", "'a'", "a float, or an array"),
+    (lambda: estimator().run([0.0], [HUGE]), "measured", "[1000", "numbers"),
 ]  # fmt: skip
 SIGNALS: list[Case] = [
     (lambda: loop().step([0.0] * 3), "reference", "[0.0, 0.0, 0.0]", "2 finite numbers"),
     (lambda: loop().step([0.0, NAN]), "reference", "nan", "2 finite numbers"),
     (lambda: loop().step("ab"), "reference", "'ab'", "2 finite numbers"),
+    (lambda: loop().step([HUGE, 0.0]), "reference", "[1000", "2 finite numbers"),
+    (lambda: loop().step([0.0, 0.0], HUGE), "time", "1000", "finite number of seconds"),
     (lambda: loop().step([0.0, 0.0], NAN), "time", "nan", "finite number of seconds"),
     (lambda: loop().on_tip([0.0], 0.0), "values", "[0.0]", "an array (2,)"),
     (lambda: loop().on_tip([NAN, NAN], 0.0), "values", "[nan, nan]", "not all NaN"),
@@ -120,6 +180,8 @@ SIGNALS: list[Case] = [
      "features", "'a'", "4 finite numbers"),
     (lambda: HysteresisReduction(Config()).on_features([[0], [0, 1]], 0.0),
      "features", "[0, 1]", "4 finite numbers"),
+    (lambda: HysteresisReduction(Config()).on_features([NAN] * 4, 0.0),
+     "features", "nan", "None where neither band was found"),
     (lambda: loop().on_sample((Tip([0, 0], 0.0),)),  # type: ignore[arg-type]
      "measurement", "tuple", "Tip, Pose or Points"),
     (lambda: loop().on_tip([0.0, 0.0], 0.0, sensor=1.0),  # type: ignore[arg-type]
@@ -128,6 +190,7 @@ SIGNALS: list[Case] = [
      "compensation", "'all'", "0 to 1"),
     (lambda: loop().predict_state(0.0), "predict_state", "[[dof]]", "on_tip"),
     (lambda: HysteresisReduction(Config()).on_tip([0.0], 0.0), "on_tip", "no [[dof]]", "axes"),
+    (lambda: loop().set_compensation(HUGE), "compensation", "1000", "0 to 1"),
     (lambda: loop().set_compensation(1.5), "compensation", "1.5", "0 to 1"),
 ]  # fmt: skip
 SAMPLES: list[Case] = [
@@ -148,7 +211,9 @@ SAMPLES: list[Case] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("case", [*CONFIGURATIONS, *SIGNALS, *SAMPLES], ids=lambda case: case[1])
+@pytest.mark.parametrize(
+    "case", [*CONFIGURATIONS, *ARRAYS, *SIGNALS, *SAMPLES], ids=lambda case: case[1]
+)
 def test_an_error_says_where_what_and_what_may_come(case: Case) -> None:
     call, field, value, allowed = case
     with pytest.raises(FieldError) as caught:
@@ -169,3 +234,15 @@ def test_a_covariance_that_was_turned_is_symmetric_up_to_rounding() -> None:
     for turn in Rotation.random(50, rng=1).as_matrix():
         turned = turn @ (1e-4 * np.eye(3)) @ turn.T
         assert (check_covariance("covariance", turned, 3) == turned).all()
+
+
+def test_what_is_masked_was_not_measured() -> None:
+    for masked in ([0.5, 0.0], [5, 0]):
+        report = loop().on_tip(np.ma.array(masked, mask=[True, False]), 0.0)
+        assert report.observable.tolist() == [False, True]
+        assert np.isnan(report.innovation[0])
+    with pytest.raises(SignalError, match=r"^reference: got \[nan, 0.0\]"):
+        loop().step(np.ma.array([0.0, 0.0], mask=[True, False]))
+    turned = np.ma.array([0.0, 0.0, 0.0, 1.0], mask=[True, False, False, False])
+    with pytest.raises(SignalError, match=r"^orientation: got \[nan"):
+        loop().on_sample(Pose([0.0] * 3, 0.0, turned))

@@ -10,6 +10,7 @@ from unittest.mock import MagicMock
 from xml.etree import ElementTree
 
 import pytest
+from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parents[2]
 ROS = ROOT / "ros"
@@ -98,12 +99,34 @@ def test_the_launch_file_starts_the_node_of_the_package_it_is_installed_with(
     for name in imported(source):
         for module in re.findall(rf"from ({name}[\w.]*) import", source.read_text("utf-8")):
             monkeypatch.setitem(sys.modules, module, MagicMock())
+    sys.modules["launch.substitutions"].LaunchConfiguration = "value of {}".format
     path = tmp_path / "share" / package / "launch" / source.name
     path.parent.mkdir(parents=True)
     path.write_bytes(source.read_bytes())
     runpy.run_path(str(path))["generate_launch_description"]()
     (node,) = sys.modules["launch_ros.actions"].LifecycleNode.call_args_list
     assert (node.kwargs["package"], node.kwargs["executable"]) == (package, "instrument_node")
+
+    # Every parameter can be given, by a file of the package unless there is another.
+    parameters = ["value of params_file", {"config": "value of config"}]
+    assert node.kwargs["parameters"] == parameters
+    declared = sys.modules["launch.actions"].DeclareLaunchArgument.call_args_list
+    defaults = {call.args[0]: call.kwargs.get("default_value") for call in declared}
+    assert defaults["params_file"] == str(path.parents[1] / "config" / "node.yaml")
+    build = "CMakeLists.txt" if package == CONTROL.name else "setup.py"
+    assert "config/node.yaml" in (ROS / package / build).read_text("utf-8")
+
+
+def test_parameter_files_are_for_the_node_and_have_its_parameters():
+    page = (ROOT / "docs/interfaces/ros2_packages.md").read_text("utf-8")
+    files = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    files.append((ROS / "tautscope_node/config/node.yaml").read_text("utf-8"))
+    declared = re.findall(r'declare\("(\w+)"', (CONTROL / "src/session.cpp").read_text("utf-8"))
+    for text in files:
+        (heading, content), *others = YAML(typ="safe").load(text).items()
+        # In any namespace: that of the node is an argument of the launch file.
+        assert (heading, others) == ("/**", [])
+        assert set(content["ros__parameters"]) <= set(declared)
 
 
 def test_launch_files_use_what_is_declared():

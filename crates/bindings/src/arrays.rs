@@ -2,6 +2,7 @@
 
 use numpy::ndarray::ArrayView1;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -12,8 +13,30 @@ pub type Vector<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 /// Anything that numpy converts to a table (n, columns).
 pub type Table<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
+/// An argument before it is converted, so that the error can name it.
+pub type Given<'py> = Bound<'py, PyAny>;
+
+/// The array of an argument.
+pub fn array<'a, 'py, T>(field: &str, given: &'a Given<'py>, allowed: &str) -> PyResult<T>
+where
+    T: FromPyObject<'a, 'py, Error = PyErr>,
+{
+    given.extract().map_err(|error: PyErr| {
+        let py = given.py();
+        let is_other = error.is_instance_of::<PyTypeError>(py)
+            || error.is_instance_of::<PyValueError>(py)
+            || error.is_instance_of::<PyOverflowError>(py);
+        if is_other {
+            errors::exception(py, "SignalError", field, given, allowed)
+        } else {
+            error
+        }
+    })
+}
+
 /// The N values of a vector.
-pub fn fixed<const N: usize>(field: &str, array: &Vector<'_>) -> PyResult<[f64; N]> {
+pub fn fixed<const N: usize>(field: &str, given: &Given<'_>) -> PyResult<[f64; N]> {
+    let array: Vector<'_> = array(field, given, &format!("an array ({N},) of numbers"))?;
     let view = array.as_array();
     row(view).ok_or_else(|| {
         let allowed = format!("{N} values");
@@ -22,7 +45,8 @@ pub fn fixed<const N: usize>(field: &str, array: &Vector<'_>) -> PyResult<[f64; 
 }
 
 /// The rows of a table with N columns.
-pub fn rows<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<Vec<[f64; N]>> {
+pub fn rows<const N: usize>(field: &str, given: &Given<'_>) -> PyResult<Vec<[f64; N]>> {
+    let table: Table<'_> = array(field, given, &format!("an array (n, {N}) of numbers"))?;
     let view = table.as_array();
     let rows: Option<Vec<[f64; N]>> = view.rows().into_iter().map(row).collect();
     rows.ok_or_else(|| {
@@ -70,16 +94,16 @@ fn row<const N: usize>(view: ArrayView1<'_, f64>) -> Option<[f64; N]> {
 }
 
 /// An optional covariance (4, 4) of features.
-pub fn covariance(table: Option<Table<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
-    let table = table.as_ref();
-    table.map(|table| four("covariance", table)).transpose()
+pub fn covariance(given: Option<Given<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
+    let given = given.as_ref();
+    given.map(|given| four("covariance", given)).transpose()
 }
 
 /// The four rows of a table, one per feature.
-pub fn four<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<[[f64; N]; 4]> {
-    let lines = rows(field, table)?;
+pub fn four<const N: usize>(field: &str, given: &Given<'_>) -> PyResult<[[f64; N]; 4]> {
+    let lines = rows(field, given)?;
     let found = lines.len();
     lines
         .try_into()
-        .map_err(|_| errors::length(table.py(), field, found, "4 rows"))
+        .map_err(|_| errors::length(given.py(), field, found, "4 rows"))
 }

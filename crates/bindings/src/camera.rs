@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, fixed, rows, table};
+use crate::arrays::{Given, fixed, rows, table};
 use crate::description::described;
 use crate::errors;
 
@@ -22,9 +22,9 @@ impl Camera {
         fy: f64,
         cx: f64,
         cy: f64,
-        distortion: [f64; 8],
+        distortion: Given<'_>,
     ) -> PyResult<Self> {
-        core::Camera::new([fx, fy], [cx, cy], distortion)
+        core::Camera::new([fx, fy], [cx, cy], fixed("distortion", &distortion)?)
             .map(Self)
             .map_err(errors::config(py))
     }
@@ -33,7 +33,7 @@ impl Camera {
     fn project<'py>(
         &self,
         py: Python<'py>,
-        points: Table<'py>,
+        points: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let invisible = [f64::NAN; 2];
         let pixels: Vec<[f64; 2]> = rows("points", &points)?
@@ -47,7 +47,7 @@ impl Camera {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        point: Vector<'py>,
+        point: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let invisible = [[f64::NAN; 3]; 2];
         let image = self.0.project(fixed("point", &point)?);

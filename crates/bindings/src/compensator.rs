@@ -1,11 +1,13 @@
 //! `Compensator`.
 
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 use tautscope_core as core;
 
+use crate::arrays::Given;
 use crate::description::{described, described_with};
 use crate::errors;
-use crate::per_axis::{Axes, PerAxis, Samples, shaped};
+use crate::per_axis::{Axes, PerAxis, shaped};
 
 /// The limited-gain inverse of the plays of 1 to 8 axes, each by itself, Eqs. (2)-(3), Fig. 2.
 ///
@@ -21,17 +23,18 @@ pub struct Compensator(Axes<(core::Compensator, core::CompensatorState)>);
 impl Compensator {
     #[new]
     #[pyo3(
-        signature = (*, free_gain, gain_limit, delta_minus, delta_plus, recovery=PerAxis::One(0.0)),
+        signature = (*, free_gain, gain_limit, delta_minus, delta_plus, recovery=None),
         text_signature = "(*, free_gain, gain_limit, delta_minus, delta_plus, recovery=0.0)"
     )]
     fn new(
         py: Python<'_>,
-        free_gain: PerAxis,
-        gain_limit: PerAxis,
-        delta_minus: PerAxis,
-        delta_plus: PerAxis,
-        recovery: PerAxis,
+        free_gain: Given<'_>,
+        gain_limit: Given<'_>,
+        delta_minus: Given<'_>,
+        delta_plus: Given<'_>,
+        recovery: Option<Given<'_>>,
     ) -> PyResult<Self> {
+        let recovery = recovery.unwrap_or_else(|| PyFloat::new(py, 0.0).into_any());
         let settings = [
             ("free_gain", free_gain),
             ("gain_limit", gain_limit),
@@ -49,8 +52,8 @@ impl Compensator {
 
     /// The command c for the next reference u. The first command is the reference; a reference that is
     /// unchanged or not finite repeats the last command.
-    fn step(&mut self, py: Python<'_>, reference: PerAxis) -> PyResult<PerAxis> {
-        let references = self.0.values(py, "reference", reference)?;
+    fn step(&mut self, reference: Given<'_>) -> PyResult<PerAxis> {
+        let references = self.0.values("reference", &reference)?;
         let axes = self.0.all.iter_mut().zip(references);
         let commands = axes.map(|((inner, state), reference)| inner.step(state, reference));
         let commands = commands.collect();
@@ -58,13 +61,9 @@ impl Compensator {
     }
 
     /// `step` for references (m,), of n axes (m, n): commands likewise.
-    fn run<'py>(
-        &mut self,
-        py: Python<'py>,
-        references: Samples<'py>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn run<'py>(&mut self, py: Python<'py>, references: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let references = self.0.rows("references", &references)?;
         let references = references.as_array();
-        self.0.check_rows(py, "references", &references)?;
         let count = self.0.all.len();
         let step = |(index, reference): (usize, &f64)| {
             let (inner, state) = &mut self.0.all[index % count];
@@ -78,11 +77,11 @@ impl Compensator {
     fn set_offsets(
         &mut self,
         py: Python<'_>,
-        delta_minus: PerAxis,
-        delta_plus: PerAxis,
+        delta_minus: Given<'_>,
+        delta_plus: Given<'_>,
     ) -> PyResult<()> {
-        let minus = self.0.values(py, "delta_minus", delta_minus)?;
-        let plus = self.0.values(py, "delta_plus", delta_plus)?;
+        let minus = self.0.values("delta_minus", &delta_minus)?;
+        let plus = self.0.values("delta_plus", &delta_plus)?;
         let plays = minus.into_iter().zip(plus);
         let plays: Result<Vec<_>, _> = plays
             .map(|(minus, plus)| core::Play::new(minus, plus))

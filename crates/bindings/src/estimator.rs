@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use tautscope_core as core;
 
-use crate::arrays::same_length;
+use crate::arrays::{Given, same_length};
 use crate::description::described_with;
-use crate::per_axis::{Axes, PerAxis, Samples, shaped};
+use crate::per_axis::{Axes, PerAxis, shaped};
 
 /// On-line estimation of the contact offsets of 1 to 8 axes from command and output, each by itself, Eqs. (4)-(6), Fig. 3.
 ///
@@ -41,11 +41,11 @@ impl Estimator {
     ))]
     fn new(
         py: Python<'_>,
-        update_distance: PerAxis,
-        contact_tolerance: PerAxis,
-        smoothing_factor: PerAxis,
-        delta_minus: PerAxis,
-        delta_plus: PerAxis,
+        update_distance: Given<'_>,
+        contact_tolerance: Given<'_>,
+        smoothing_factor: Given<'_>,
+        delta_minus: Given<'_>,
+        delta_plus: Given<'_>,
     ) -> PyResult<Self> {
         let settings = [
             ("update_distance", update_distance),
@@ -75,12 +75,12 @@ impl Estimator {
     fn update<'py>(
         &mut self,
         py: Python<'py>,
-        command: PerAxis,
-        measured: PerAxis,
+        command: Given<'_>,
+        measured: Given<'_>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let is_one = matches!(command, PerAxis::One(_));
-        let commands = self.0.values(py, "command", command)?;
-        let measured = self.0.values(py, "measured", measured)?;
+        let is_one = matches!(PerAxis::of("command", &command)?, PerAxis::One(_));
+        let commands = self.0.values("command", &command)?;
+        let measured = self.0.values("measured", &measured)?;
         let pairs = commands.into_iter().zip(measured);
         let axes = self.0.all.iter_mut().zip(pairs);
         let triggers = axes.map(|(axis, (command, measured))| {
@@ -94,8 +94,8 @@ impl Estimator {
     }
 
     /// The output of the play with the offsets estimated so far, for the next command.
-    fn predict(&mut self, py: Python<'_>, command: PerAxis) -> PyResult<PerAxis> {
-        let commands = self.0.values(py, "command", command)?;
+    fn predict(&mut self, command: Given<'_>) -> PyResult<PerAxis> {
+        let commands = self.0.values("command", &command)?;
         let axes = self.0.all.iter_mut().zip(commands);
         let outputs = axes.map(|(axis, command)| axis.predict(command)).collect();
         Ok(self.0.pack(outputs))
@@ -108,12 +108,12 @@ impl Estimator {
     fn run<'py>(
         &mut self,
         py: Python<'py>,
-        commands: Samples<'py>,
-        measured: Samples<'py>,
-    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
+        commands: Given<'py>,
+        measured: Given<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let commands = self.0.rows("commands", &commands)?;
+        let measured = self.0.rows("measured", &measured)?;
         let (commands, measured) = (commands.as_array(), measured.as_array());
-        self.0.check_rows(py, "commands", &commands)?;
-        self.0.check_rows(py, "measured", &measured)?;
         same_length(py, "measured", measured.len(), commands.len())?;
         let (mut predicted, mut minus, mut plus) = (Vec::new(), Vec::new(), Vec::new());
         let axes = self.0.all.len();
@@ -124,11 +124,11 @@ impl Estimator {
             minus.push(axis.state.play().delta_minus());
             plus.push(axis.state.play().delta_plus());
         }
-        Ok([
+        Ok((
             shaped(py, predicted, &commands)?,
             shaped(py, minus, &commands)?,
             shaped(py, plus, &commands)?,
-        ])
+        ))
     }
 
     /// Estimated offset at the negative contact, input minus output.

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, columns, fixed, rows, same_length, table};
+use crate::arrays::{Given, Vector, columns, fixed, rows, same_length, table};
 use crate::camera::Camera;
 use crate::description::described;
 use crate::errors;
@@ -41,7 +41,7 @@ impl FeatureModel {
     fn predict<'py>(
         &self,
         py: Python<'py>,
-        state: Vector<'py>,
+        state: Given<'py>,
     ) -> PyResult<Option<Prediction<'py>>> {
         let Some(prediction) = self.0.predict(fixed("state", &state)?) else {
             return Ok(None);
@@ -57,7 +57,7 @@ impl FeatureModel {
     fn predict_all<'py>(
         &self,
         py: Python<'py>,
-        states: Table<'py>,
+        states: Given<'py>,
         unevenness: Vector<'py>,
     ) -> PyResult<Predictions<'py>> {
         let (states, unevenness) = (rows::<3>("states", &states)?, unevenness.as_array());
@@ -78,7 +78,7 @@ impl FeatureModel {
     /// Per band area in px^2, centroid (2,) in px, second moments (2, 2) in px^2 and outline (26, 2) in px.
     ///
     /// None where a band is not visible.
-    fn bands<'py>(&self, py: Python<'py>, state: Vector<'py>) -> PyResult<Option<Bands<'py>>> {
+    fn bands<'py>(&self, py: Python<'py>, state: Given<'py>) -> PyResult<Option<Bands<'py>>> {
         let Some(bands) = self.0.bands(fixed("state", &state)?) else {
             return Ok(None);
         };
@@ -99,10 +99,10 @@ impl FeatureModel {
     fn nearest_state<'py>(
         &self,
         py: Python<'py>,
-        state: Vector<'py>,
-        state_std: Vector<'py>,
-        features: Vector<'py>,
-        std: Vector<'py>,
+        state: Given<'py>,
+        state_std: Given<'py>,
+        features: Given<'py>,
+        std: Given<'py>,
     ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, f64)>> {
         let prior = core::StatePrior {
             state: fixed("state", &state)?,

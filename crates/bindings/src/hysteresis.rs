@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, fixed, rows, table};
+use crate::arrays::{Given, fixed, rows, table};
 use crate::errors;
 
 /// Hysteresis of the three DOFs with constant parameters, for simulated instruments.
@@ -23,8 +23,8 @@ impl Hysteresis {
     #[pyo3(signature = (*, half_width, centre, shared, radius))]
     fn new(
         py: Python<'_>,
-        half_width: Vector<'_>,
-        centre: Vector<'_>,
+        half_width: Given<'_>,
+        centre: Given<'_>,
         shared: f64,
         radius: f64,
     ) -> PyResult<Self> {
@@ -62,7 +62,7 @@ impl Hysteresis {
     fn run<'py>(
         &self,
         py: Python<'py>,
-        commands: Table<'py>,
+        commands: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let commands = rows::<3>("commands", &commands)?;
         let Some(first) = commands.first() else {

@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Vector, columns, fixed, table};
+use crate::arrays::{Given, columns, fixed, table};
 use crate::description::described;
 use crate::errors;
 
@@ -36,7 +36,7 @@ impl Instrument {
     fn markers<'py>(
         &self,
         py: Python<'py>,
-        state: Vector<'py>,
+        state: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let markers = self.0.markers(fixed("state", &state)?);
         table(py, &markers.map(|marker| marker.position))
@@ -46,7 +46,7 @@ impl Instrument {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        state: Vector<'py>,
+        state: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let [a, b] = self.0.markers(fixed("state", &state)?);
         let joined = |[a, b]: [[f64; 3]; 2]| [a, b].as_flattened().to_vec();

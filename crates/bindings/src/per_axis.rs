@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyFloat;
 use tautscope_core::{ConfigError, DOFS};
 
+use crate::arrays::{Given, array};
 use crate::errors;
 
 /// A float for one axis, or an array (n,).
@@ -16,25 +17,20 @@ pub enum PerAxis {
     Many(Vec<f64>),
 }
 
-impl<'a, 'py> FromPyObject<'a, 'py> for PerAxis {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(value) = object.cast::<PyFloat>() {
+impl PerAxis {
+    /// The values of an argument.
+    pub fn of(field: &str, given: &Given<'_>) -> PyResult<Self> {
+        if let Ok(value) = given.cast::<PyFloat>() {
             return Ok(Self::One(value.value()));
         }
-        let array: Samples<'_> = object.extract()?;
+        let allowed = "a float, or an array (n,)";
+        let array: Samples<'_> = array(field, given, allowed)?;
         let array = array.as_array();
-        let values = array.iter().copied().collect();
+        let values: Vec<f64> = array.iter().copied().collect();
         match array.ndim() {
             0 => Ok(Self::One(array.sum())),
             1 => Ok(Self::Many(values)),
-            _ => Err(errors::length(
-                object.py(),
-                "axes",
-                values.len(),
-                "a float, or an array (n,)",
-            )),
+            _ => Err(errors::length(given.py(), field, values.len(), allowed)),
         }
     }
 }
@@ -65,10 +61,14 @@ impl<T> Axes<T> {
     /// From K settings, where a float is for all axes.
     pub fn new<const K: usize>(
         py: Python<'_>,
-        settings: [(&'static str, PerAxis); K],
+        settings: [(&'static str, Given<'_>); K],
         build: impl Fn([f64; K]) -> Result<T, ConfigError>,
     ) -> PyResult<Self> {
-        let count = settings.iter().find_map(|(_, value)| match value {
+        let mut read = Vec::with_capacity(K);
+        for (name, given) in settings {
+            read.push((name, PerAxis::of(name, &given)?));
+        }
+        let count = read.iter().find_map(|(_, value)| match value {
             PerAxis::One(_) => None,
             PerAxis::Many(values) => Some(values.len()),
         });
@@ -78,7 +78,7 @@ impl<T> Axes<T> {
         };
         let count = count.unwrap_or(1);
         let mut columns: [Vec<f64>; K] = std::array::from_fn(|_| Vec::new());
-        for (column, (name, value)) in columns.iter_mut().zip(settings) {
+        for (column, (name, value)) in columns.iter_mut().zip(read) {
             *column = match value {
                 PerAxis::One(value) => vec![value; count],
                 PerAxis::Many(values) => values,
@@ -96,8 +96,9 @@ impl<T> Axes<T> {
     }
 
     /// The values of a signal for each axis.
-    pub fn values(&self, py: Python<'_>, name: &str, given: PerAxis) -> PyResult<Vec<f64>> {
-        match given {
+    pub fn values(&self, name: &str, given: &Given<'_>) -> PyResult<Vec<f64>> {
+        let py = given.py();
+        match PerAxis::of(name, given)? {
             PerAxis::One(value) if self.all.len() == 1 => Ok(vec![value]),
             PerAxis::Many(values) if self.all.len() == values.len() => Ok(values),
             PerAxis::One(_) => Err(self.wrong(py, name, 1)),
@@ -106,17 +107,15 @@ impl<T> Axes<T> {
     }
 
     /// The rows of samples, one value per axis.
-    pub fn check_rows(
-        &self,
-        py: Python<'_>,
-        name: &str,
-        samples: &ArrayViewD<'_, f64>,
-    ) -> PyResult<()> {
-        match *samples.shape() {
-            [_] if self.is_one => Ok(()),
-            [_, axes] if !self.is_one && axes == self.all.len() => Ok(()),
-            _ => Err(self.wrong(py, name, samples.len())),
+    pub fn rows<'py>(&self, name: &str, given: &Given<'py>) -> PyResult<Samples<'py>> {
+        let samples: Samples<'_> = array(name, given, "an array of numbers")?;
+        let view = samples.as_array();
+        match *view.shape() {
+            [_] if self.is_one => {}
+            [_, axes] if !self.is_one && axes == self.all.len() => {}
+            _ => return Err(self.wrong(given.py(), name, view.len())),
         }
+        Ok(samples)
     }
 
     /// A value of each axis.

@@ -4,7 +4,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::Vector;
+use crate::arrays::{Given, Vector, array};
 use crate::description::described_with;
 use crate::errors;
 
@@ -35,10 +35,15 @@ impl Play {
     }
 
     /// `step` for inputs (n,): outputs (n,).
-    fn run<'py>(&mut self, py: Python<'py>, inputs: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        inputs: Given<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inputs: Vector<'_> = array("inputs", &inputs, "an array (n,) of numbers")?;
         let inputs = inputs.as_array();
         let outputs = inputs.iter().map(|input| self.step(*input));
-        PyArray1::from_iter(py, outputs)
+        Ok(PyArray1::from_iter(py, outputs))
     }
 
     /// The latest output y.

@@ -9,7 +9,7 @@ use pyo3::types::PyTuple;
 use tautscope_config::{AnyLoop, AxesSettings, Selection};
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, covariance as known, fixed, same_length};
+use crate::arrays::{Given, Table, Vector, covariance as known, fixed, same_length};
 use crate::errors;
 use crate::estimator::trigger_names;
 use crate::flags;
@@ -110,9 +110,9 @@ impl Reduction {
     fn on_features<'py>(
         &mut self,
         py: Python<'py>,
-        features: Option<Vector<'py>>,
+        features: Option<Given<'py>>,
         captured_at: f64,
-        covariance: Option<Table<'py>>,
+        covariance: Option<Given<'py>>,
         checksum: Option<u64>,
     ) -> PyResult<Report<'py>> {
         let features = features

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, fixed, four, rows, same_length, table};
+use crate::arrays::{Given, fixed, four, rows, same_length, table};
 use crate::description::described;
 use crate::errors;
 use crate::features::FeatureModel;
@@ -39,10 +39,10 @@ impl StateEstimator {
     fn estimate<'py>(
         &self,
         py: Python<'py>,
-        predicted_state: Vector<'py>,
-        predicted_features: Vector<'py>,
-        interaction_matrix: Table<'py>,
-        measured_features: Vector<'py>,
+        predicted_state: Given<'py>,
+        predicted_features: Given<'py>,
+        interaction_matrix: Given<'py>,
+        measured_features: Given<'py>,
     ) -> PyResult<Estimate<'py>> {
         let [a, b, c, d]: [[f64; 3]; 4] = four("interaction_matrix", &interaction_matrix)?;
         let prediction = core::FeaturePrediction {
@@ -67,8 +67,8 @@ impl StateEstimator {
         &self,
         py: Python<'py>,
         model: &FeatureModel,
-        predicted_states: Table<'py>,
-        measured_features: Table<'py>,
+        predicted_states: Given<'py>,
+        measured_features: Given<'py>,
     ) -> PyResult<Estimates<'py>> {
         let states: Vec<[f64; 3]> = rows("predicted_states", &predicted_states)?;
         let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;

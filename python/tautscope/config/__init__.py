@@ -14,7 +14,7 @@ from tautscope.config.drives import AxisConfig, DrivesConfig
 from tautscope.config.experiment import ExperimentConfig, InstrumentConfig, Sine
 from tautscope.config.load import RIGS, axes, config_file, dump_config, load_config
 from tautscope.config.recording import RecordingConfig
-from tautscope.config.root import Config, Profile, from_document, to_document
+from tautscope.config.root import Config, Profile, check_config, from_document, to_document
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.twin import (
     DISTURBANCES,
@@ -64,6 +64,7 @@ __all__ = [
     "TwinConfig",
     "VisionConfig",
     "axes",
+    "check_config",
     "config_file",
     "dump_config",
     "from_document",

@@ -125,6 +125,17 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return _checked(document)
 
 
+def check_config(config: Config) -> Config:
+    """The configuration, where it is one and not the name of a file.
+
+    Raises:
+        ConfigError: It is something else.
+    """
+    if not isinstance(config, Config):
+        raise ConfigError("config", config, "a tautscope.Config, as load_config(path) returns it")
+    return config
+
+
 def from_document(document: dict[str, Any]) -> Config:
     """Make a checked `Config` of a nested dictionary; keys not in it keep their defaults.
 

@@ -25,7 +25,7 @@ _LOG_PERIOD = 1.0
 """Time between two looks at the size of the log and at the free disk [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bands:
     """States of an image of the bands, each (3,) [m, rad, rad].
 

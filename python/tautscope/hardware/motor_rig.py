@@ -11,7 +11,7 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.config import Config, DrivesConfig
+from tautscope.config import Config, DrivesConfig, check_config
 from tautscope.errors import ConfigError, SignalError
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.realtime import LOOP, realtime, short_switch_interval
@@ -199,7 +199,7 @@ def require_drives(config: Config) -> DrivesConfig:
     Raises:
         ConfigError: The section is missing, or ``control.period`` is not its cycle.
     """
-    drives = config.drives
+    drives = check_config(config).drives
     if drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
     if config.control.period != drives.cycle:

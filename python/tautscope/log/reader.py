@@ -27,7 +27,7 @@ from tautscope.runs.recording import Floats, Recording, update_columns
 from tautscope.runs.run_recorder import Row, RunRecorder
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tick:
     """A recorded control tick; the sample has no frame."""
 
@@ -38,7 +38,7 @@ class Tick:
     raw: msg.Messages
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Update:
     """A recorded update: its `update_row`, the offsets after it, and its measurement if any."""
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.config import Config
+from tautscope.config import Config, check_config
 from tautscope.config.actuators import scaled_matrix
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.named_class import instance, named_class
@@ -198,6 +198,6 @@ class ActuatedRig:
 
 def with_actuators(rig: Rig, config: Config) -> Rig:
     """The rig, behind the map of section ``actuators`` if there is one and it is not there yet."""
-    if config.actuators is None or isinstance(rig, ActuatedRig):
+    if check_config(config).actuators is None or isinstance(rig, ActuatedRig):
         return rig
     return ActuatedRig(rig, config)

@@ -21,7 +21,7 @@ from tautscope.loop.kinematics import (
     jacobian_by_differences,
     rotation_vector,
 )
-from tautscope.loop.signal_checks import check_covariance, check_numbers
+from tautscope.loop.signal_checks import as_floats, check_covariance, check_numbers
 
 Model = Callable[[Floats], tuple[Floats, Floats] | None]
 """State (n,) to the values (m,) that would be measured and their derivatives (m, n)."""
@@ -29,7 +29,7 @@ _UNIT_LENGTH = 1e-3
 """How far a quaternion or a rotation matrix may be from one by rounding."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tip:
     """The tip measured degree by degree: values (n,) [m or rad], NaN for what was not measured."""
 
@@ -39,7 +39,7 @@ class Tip:
     sensor: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pose:
     """Position (3,) [m] and, if measured, orientation of the tip, by an EM tracker for example.
 
@@ -54,7 +54,7 @@ class Pose:
     sensor: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Points:
     """Pixels (k, 2) of the points of the kinematics; NaN for one that was not found."""
 
@@ -70,9 +70,9 @@ Measurement = Tip | Pose | Points
 def raw_values(measurement: Measurement) -> Floats:
     """The values (n,), position (3,) or pixels (k, 2) of a measurement."""
     if isinstance(measurement, Tip):
-        return np.asarray(measurement.values, dtype=np.float64)
+        return as_floats(measurement.values)
     found = measurement.position if isinstance(measurement, Pose) else measurement.pixels
-    return np.asarray(found, dtype=np.float64)
+    return as_floats(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,8 +175,8 @@ def check_rotation(orientation: ArrayLike) -> Floats:
     """
     allowed = "a rotation matrix (3, 3) or a quaternion (4,) x, y, z, w of length 1"
     try:
-        found = np.asarray(orientation, dtype=np.float64)
-    except (TypeError, ValueError):
+        found = as_floats(orientation)
+    except (TypeError, ValueError, OverflowError):
         raise SignalError("orientation", orientation, allowed) from None
     if found.shape == (4,) and abs(float(found @ found) - 1) < 2 * _UNIT_LENGTH:
         x, y, z, w = found / np.sqrt(found @ found)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope._core import MOST_SENSORS
-from tautscope.config import Config
+from tautscope.config import Config, check_config
 from tautscope.dof import display_text
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import Actuators
@@ -63,7 +63,7 @@ class Status(StrEnum):
     """A monitor rejected the frame, and no estimate was updated; `Report.warnings` names it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Report:
     """Result of an update by an image or another measurement; NaN is not known.
 
@@ -172,7 +172,7 @@ class HysteresisReduction:
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
-        self._config = config
+        self._config = check_config(config)
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
@@ -418,7 +418,7 @@ class HysteresisReduction:
         """
         try:
             value = float(share)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ConfigError("compensation", share, "a share from 0 to 1") from None
         self._loop.set_compensation(value)
         self._notify(f"set_compensation {value!r}")

@@ -23,7 +23,7 @@ _WATCH_PERIOD = 0.005
 _STOPPED = "stopped while it was being enabled"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One camera image.
 
@@ -48,7 +48,7 @@ class Frame:
         return f"<Frame {self.sequence}: {width} x {height}, captured at {self.captured_at:.3f} s>"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Sample:
     """What a rig reports after one control period.
 
@@ -164,7 +164,7 @@ def check_sample(sample: Sample, config: Config) -> Sample:
             raise SignalError(f"sample.{name}", value, allowed)
         try:
             shape = np.asarray(value, dtype=np.float64).shape
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise SignalError(f"sample.{name}", value, allowed) from None
         if shape != (count,):
             raise SignalError(f"sample.{name}", f"an array {shape}", allowed)

@@ -18,7 +18,10 @@ def check_features(values: ArrayLike) -> NDArray[np.float64]:
         SignalError: They are anything else.
     """
     features = _numbers("features", values, "4 finite numbers")
-    if features.shape != (4,) or np.isnan(features).all():
+    if features.shape == (4,) and np.isnan(features).all():
+        allowed = "None where neither band was found, NaN for the features of one"
+        raise SignalError("features", features.tolist(), allowed)
+    if features.shape != (4,):
         return check_signal("features", values, (4,))
     lost = np.isnan(features).reshape(2, 2).all(axis=1).repeat(2)
     check_signal("features", np.where(lost, 0.0, features), (4,))
@@ -45,9 +48,12 @@ def check_time(field: str, value: float) -> float:
     Raises:
         SignalError: It is not a finite number.
     """
-    if not isinstance(value, float | int | np.floating | np.integer) or not math.isfinite(value):
-        raise SignalError(field, value, "a finite number of seconds")
-    return float(value)
+    try:
+        if isinstance(value, float | int | np.floating | np.integer) and math.isfinite(value):
+            return float(value)
+    except OverflowError:
+        pass
+    raise SignalError(field, value, "a finite number of seconds")
 
 
 def check_numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -92,8 +98,15 @@ def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.fl
     return array
 
 
+def as_floats(values: ArrayLike) -> NDArray[np.float64]:
+    """Numbers as an array; those that are masked are NaN."""
+    if isinstance(values, np.ma.MaskedArray):
+        values = np.ma.filled(values.astype(np.float64), np.nan)
+    return np.asarray(values, dtype=np.float64)
+
+
 def _numbers(field: str, values: ArrayLike, allowed: str) -> NDArray[np.float64]:
     try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        return as_floats(values)
+    except (TypeError, ValueError, OverflowError):
         raise SignalError(field, values, allowed) from None

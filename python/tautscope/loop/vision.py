@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
-from tautscope.config import Config
+from tautscope.config import Config, check_config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.signal_checks import as_floats
 from tautscope.loop.state_prediction import StatePrediction
 
 
@@ -159,7 +160,7 @@ class MarkerDetector:
     """
 
     def __init__(self, config: Config) -> None:
-        self._layout = FrameLayout(config.camera)
+        self._layout = FrameLayout(check_config(config).camera)
         self._model = build_feature_model(config)
         self._starts = workspace_starts(config)
         self._start_deviation = np.array([config[dof].start_deviation for dof in Dof])
@@ -305,8 +306,8 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
     if predicted is None:
         return None
     try:
-        features = np.asarray(predicted, dtype=np.float64)
-    except (TypeError, ValueError):
+        features = as_floats(predicted)
+    except (TypeError, ValueError, OverflowError):
         features = np.empty(0)
     if features.shape != (4,):
         raise FieldError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.config import Config
+from tautscope.config import Config, check_config
 from tautscope.errors import ConfigError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.kinematics import build_kinematics, rotation_matrix
@@ -58,7 +58,7 @@ class PlayRig:
         delay: float = 0.0,
         seed: int | np.random.Generator = 0,
     ) -> None:
-        if not config.dof:
+        if not check_config(config).dof:
             raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
         self.config, self.control_period = config, config.control.period
         self._limits = np.array([dof.width_limit for dof in config.dof])

@@ -24,7 +24,7 @@ FRAMES_PER_BACKGROUND = 25
 """Number of frames after which the next image of the background folder is shown."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RenderedImage:
     """A rendered image with its ground truth.
 

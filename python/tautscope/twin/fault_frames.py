@@ -22,7 +22,7 @@ PIXEL_NOISE = 0.2
 _SWAPPED = [2, 3, 0, 1]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FeatureFrame(Frame):
     """A frame that carries the detected features instead of pixels.
 

@@ -80,7 +80,7 @@ def highlights(light: LinearImage, bands: Bands, noise: TemporalNoise) -> Distur
     return light, hidden
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Streak:
     """An elliptic reflection with a soft, uneven edge and a faint halo.
 

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tautscope.config import Config
+from tautscope.config import Config, check_config
 from tautscope.errors import SignalError
 from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.camera import RenderedImage, TwinCamera
@@ -34,7 +34,7 @@ class Twin:
     """
 
     def __init__(self, config: Config, *, images: bool = True) -> None:
-        self.config = config
+        self.config = check_config(config)
         self.control_period = config.control.period
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None

@@ -1,7 +1,7 @@
 """The node of a package, configured and activated; `state_command` enables it.
 
 ros2 launch tautscope_node node.launch.py config:=/path/to/config.toml
-ros2 launch tautscope_control node.launch.py config:=/path/to/config.toml
+ros2 launch tautscope_control node.launch.py config:=/path/to/config.toml params_file:=node.yaml
 """
 
 from pathlib import Path
@@ -15,23 +15,23 @@ from launch_ros.event_handlers import OnStateTransition
 from launch_ros.events.lifecycle import ChangeState
 from lifecycle_msgs.msg import Transition
 
-PACKAGE = Path(__file__).parents[1].name
-"""The package with which this file is installed, as share/PACKAGE/launch/node.launch.py."""
+SHARE = Path(__file__).parents[1]
+"""share/PACKAGE of the package with which this file is installed."""
 
 
 def generate_launch_description() -> LaunchDescription:
     """One lifecycle node in the namespace of the instrument."""
     node = LifecycleNode(
-        package=PACKAGE,
+        package=SHARE.name,
         executable="instrument_node",
         name="tautscope",
         namespace=LaunchConfiguration("namespace"),
         parameters=[
-            {
-                "config": LaunchConfiguration("config"),
-                "image_topic": LaunchConfiguration("image_topic"),
-            }
+            LaunchConfiguration("params_file"),
+            {"config": LaunchConfiguration("config")},
         ],
+        # As a parameter it would replace that of the file.
+        remappings=[("/endoscope/image_raw", LaunchConfiguration("image_topic"))],
         output="screen",
     )
 
@@ -46,6 +46,11 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "config",
                 description="Configuration; missing keys have their defaults",
+            ),
+            DeclareLaunchArgument(
+                "params_file",
+                default_value=str(SHARE / "config" / "node.yaml"),
+                description="YAML file with the other parameters, headed /**",
             ),
             DeclareLaunchArgument("namespace", default_value="instrument"),
             DeclareLaunchArgument("image_topic", default_value="/endoscope/image_raw"),

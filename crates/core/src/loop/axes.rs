@@ -19,6 +19,7 @@ use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
 use crate::supervision::frame_gate::ImageIdentity;
+use crate::supervision::monitors::SENSORS;
 
 /// Most values of a measurement.
 pub const VALUES: usize = 16;
@@ -43,13 +44,13 @@ pub trait Predict {
 pub struct Reading<'a> {
     /// Values (m,), at most [`VALUES`]; NaN for one that was not measured.
     pub values: &'a [f64],
-    /// Covariance (m, m) row by row.
+    /// Covariance (m, m) row by row, whole.
     pub covariance: &'a [f64],
     /// Values in a row that are right or wrong together: 2 for points of an image.
     pub point: usize,
     /// Time of the measurement in s, on the clock of the control ticks.
     pub captured_at: f64,
-    /// Which of four sensors; each has its own rate and delay.
+    /// Which of four sensors, 0 to 3; each has its own rate and delay.
     pub sensor: usize,
     /// The model of the sensor.
     pub model: &'a dyn Predict,
@@ -79,6 +80,9 @@ pub struct AxesReport {
 /// A loop of n DOFs whose tip any sensor measures.
 pub trait Axes: Loop {
     /// Update by a measurement.
+    ///
+    /// One without a number, with an infinite one, or in which values, covariance or sensor are not as [`Reading`] says, is not
+    /// used: [`Status::NoMarkers`].
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport;
 }
 
@@ -154,6 +158,9 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
         let Some(spread) = self.monitors.unknown_direction() else {
             return;
         };
+        if !reading.is_consistent() {
+            return;
+        }
         let Some(past) = self.history.at(reading.captured_at) else {
             return;
         };
@@ -190,7 +197,9 @@ impl<P: SensorProfile<N>, const N: usize> Observation<P, N> for Reading<'_> {
 
     fn is_usable(&self) -> bool {
         let known = |value: &f64| value.is_finite();
-        self.values.iter().any(known) && self.values.iter().all(|v| known(v) || v.is_nan())
+        self.is_consistent()
+            && self.values.iter().any(known)
+            && self.values.iter().all(|v| known(v) || v.is_nan())
     }
 
     fn measure(
@@ -305,6 +314,12 @@ impl<const N: usize> Sensor<N, VALUES, 0> for Reading<'_> {
 }
 
 impl Reading<'_> {
+    /// Whether there are not too many values, a covariance of all of them, and such a sensor.
+    fn is_consistent(&self) -> bool {
+        let count = self.values.len();
+        count <= VALUES && self.covariance.len() == count * count && self.sensor < SENSORS
+    }
+
     fn is_partial(&self) -> bool {
         self.values.iter().any(|value| value.is_nan())
     }

@@ -34,6 +34,7 @@ mod outline;
 mod play;
 mod plays;
 mod prediction_monitor;
+mod readings;
 mod recovery;
 mod reference_gate;
 mod reference_speed;

@@ -26,7 +26,7 @@ _A4 = 0.210, 0.297
 _INCH = 0.0254
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """The corners of the board in one image.
 

@@ -32,7 +32,7 @@ LEAST_DIFFERENCE = 0.04
 _TILTS = ("left", "right", "upper", "lower")
 
 
-@dataclass
+@dataclass(eq=False)
 class Coverage:
     """Cells of the image in which corners were seen, and tilts of the board.
 

@@ -54,7 +54,7 @@ class Intrinsics:
         return pixels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CameraFit:
     """The result of `fit_intrinsics`.
 
