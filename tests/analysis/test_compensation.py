@@ -8,12 +8,15 @@ import pytest
 from matplotlib.text import Annotation
 from records.simulated import simulate
 from tautscope.analysis.compensation import as_played, plant, run
-from tautscope.analysis.compensator import compensator
+from tautscope.analysis.compensation import simulate as simulate_loop
+from tautscope.analysis.compensator import Parts, compensator, notes, sensors_of, shared_delays
+from tautscope.analysis.identification import Interval
 from tautscope.analysis.models.constant_play import operator
 from tautscope.analysis.slide import slide
-from tautscope.analysis.verdict import judge
+from tautscope.analysis.verdict import judge, together
 from tautscope.config import from_document
 from tautscope.errors import RecordError
+from tautscope.loop.reduction import HysteresisReduction
 from tautscope.runs.records import Cleaning, Record, read_record
 from test_findings import judged
 
@@ -42,6 +45,7 @@ def test_without_the_loop_the_error_is_that_of_the_play(kind: str) -> None:
     assert verdict.compensation is not None
     assert 0.35 < verdict.compensation.before / truth.width < 0.5
     assert verdict.compensation.helps
+    assert ("a tip that itself lags stays late" in verdict.text) == (kind == "delay and play")
 
 
 def test_the_figure_marks_the_width_only_where_it_is_identified() -> None:
@@ -112,6 +116,66 @@ def test_a_loop_of_a_tip_that_is_very_late_can_be_loaded() -> None:
     config = from_document(compensator({"tip": (slow, late)}))
     assert config.measurement.delays[0] == pytest.approx(1.65, rel=0.02)
     assert config.safety.frame_age == config.control.history
+
+
+def late_parts(*delays: float) -> Parts:
+    """The same play again and again, with tips that are late by these times [s]."""
+    record, found = judged("play", 3).record, judged("play", 3).found
+    return {
+        f"tip_{k}": (record, replace(found, delay=Interval(each, each - 1e-3, each + 1e-3)))
+        for k, each in enumerate(delays)
+    }
+
+
+def test_tips_that_are_late_by_other_times_have_sensors_of_their_own() -> None:
+    parts = late_parts(0.6, 0.0, 0.605)
+    settings = compensator(parts)
+    assert sensors_of(parts)[0] == [0, 1, 0]
+    assert settings["measurement"]["delays"] == pytest.approx([0.6025, 0.0])
+    assert "Sensor of measurement.delays, from 0 on: tip_0 0, tip_1 1, tip_2 0;" in notes(parts)[-1]
+    assert sensors_of(late_parts(0.0, 0.004)) == ([0, 0], [])
+    alone = simulate_loop({"tip_1": parts["tip_1"]}, "tip_1")
+    assert simulate_loop(parts, "tip_1").after == pytest.approx(alone.after)
+    assert not shared_delays(parts)
+
+
+def test_of_more_delays_than_sensors_the_verdict_says_what_they_cost() -> None:
+    parts = late_parts(0.0, 0.2, 0.3, 0.6, 0.9)
+    delays = compensator(parts)["measurement"]["delays"]
+    assert delays == pytest.approx([0.0, 0.25, 0.6, 0.9])
+    one = judged("play", 3)
+    alone = [replace(one, name=name, found=found) for name, (_, found) in parts.items()]
+    verdicts = together(alone)
+    what = "compensator.toml has a delay of 0.25 s for it, since the loop has at most 4 sensors"
+    for index, verdict in enumerate(verdicts):
+        assert (what in verdict.text) == (index in {1, 2})
+        assert verdict.compensation is not None
+    costs = [each.compensation.after for each in verdicts if each.compensation is not None]
+    assert min(costs[1:3]) > 1.3 * costs[0]
+
+
+def test_a_sensor_that_is_later_than_another_is_not_missing() -> None:
+    """Its degree of freedom moves by more than its slack until the measurement arrives."""
+    delays = [0.0, 0.4]
+    document = {
+        "dof": [{"name": each, "unit": "m", "width_limit": 2e-3, "speed": 0.1} for each in "ab"],
+        "measurement": {"delays": delays},
+        "safety": {"frame_age": 0.6},
+    }
+    config = from_document(document)
+    loop, tips = HysteresisReduction(config), []
+    for tick in range(4000):
+        time = tick * config.control.period
+        loop.step(np.full(2, 10e-3 * np.sin(time)), time)
+        tips.append(loop.predicted_state)
+        for sensor, delay in enumerate(delays):
+            back = tick - round(delay / config.control.period)
+            if tick % 8 == 0 and back >= 0:
+                values = np.where(np.arange(2) == sensor, tips[back], np.nan)
+                loop.on_tip(values, time, sensor=sensor)
+        if tick == 1000:
+            loop.acknowledge()  # before the first measurement arrived it was missing
+    assert loop.supervision.latched == ()
 
 
 def test_a_loop_of_a_tip_whose_noise_is_larger_than_its_slack_can_be_loaded() -> None:

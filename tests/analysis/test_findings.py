@@ -144,6 +144,15 @@ def test_a_curve_is_named_and_a_line_is_not() -> None:
         assert any("tip: it follows the command in a curve" in str(x) for x in verdict.findings)
 
 
+def test_more_strokes_are_no_advice_for_a_dead_band() -> None:
+    record = simulate("linear", 3).record
+    tip = record.measured - record.measured.mean()
+    dead = 0.2 * np.ptp(tip)
+    verdict = judge(replace(record, measured=np.sign(tip) * np.maximum(np.abs(tip) - dead, 0)))
+    assert verdict.settings is None
+    assert "more strokes through the curve make the width no clearer" in verdict.text
+
+
 def test_nothing_drifts_before_the_fit_begins() -> None:
     """Short strokes that the fit leaves out, then nineteen long ones, with noise."""
     time = np.arange(1500) * 0.02
@@ -217,7 +226,8 @@ def test_a_tip_that_rests_in_the_gap_is_not_frozen() -> None:
     record = truth.record
     half = truth.width / abs(truth.gain) / 2
     exact = play(record.command, -half, half)
-    for tip in (exact, np.round(exact, 1)):
+    coarse = half / 2
+    for tip in (exact, np.round(exact, 1), coarse * np.round(exact / coarse)):
         verdict = judge(replace(record, measured=tip))
         assert verdict.findings == ()
         assert verdict.found.width.value == pytest.approx(2 * half, rel=0.05)
@@ -232,6 +242,9 @@ def test_units_that_do_not_fit_are_named() -> None:
     assert "near the number of mm in 1 m" in judge(millimetres).text
     degrees = replace(record, measured=record.measured / gain, units=("deg", "mm"))
     assert "the command is in deg, the tip in mm" in judge(degrees).text
+    numbers = replace(record, time=np.arange(len(record.rows), dtype=float))
+    assert "these look like sample numbers, not seconds" in str(without_errors(numbers)[1][0])
+    assert without_errors(replace(numbers, time_unit="s"))[1] == []
     slow = replace(record, time=1000 * record.clock)
     assert "a sample every 20 s is implausible" in judge(slow).text
 
@@ -250,6 +263,21 @@ def test_a_verdict_says_what_compensation_would_do() -> None:
     assert verdict.compensation.after < 0.4 * verdict.compensation.before
     assert verdict.helps
     assert "With the loop the tip's RMS error would fall from" in verdict.text
+
+
+def test_a_tip_that_moves_before_its_command_is_no_alignment() -> None:
+    """Columns named the wrong way round; clocks that differ by 20 ms are no lead."""
+    record = simulate("play", 2).record
+    swapped = judge(replace(record, command=record.measured, measured=record.command))
+    assert not swapped.found.is_aligned
+    assert swapped.settings is None
+    assert "before its command: are --command and --measured swapped" in swapped.text
+    assert "Next: exchange --command and --measured" in swapped.text
+    linear = simulate("linear", 2).record
+    for lead, is_early in ((0.02, False), (0.4, True)):
+        tip = np.interp(linear.clock + lead, linear.clock, linear.measured)
+        found = judge(replace(linear, measured=tip)).found
+        assert (found.is_early, found.is_aligned) == (is_early, not is_early)
 
 
 def test_of_many_places_three_are_named() -> None:

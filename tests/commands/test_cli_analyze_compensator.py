@@ -68,7 +68,7 @@ def test_several_degrees_of_freedom_get_a_verdict_each_and_one_loop(
     low, high = config.dof[0].travel
     assert high - low == pytest.approx(30e-3 + 2 * 1.5 * 8e-3, rel=0.01)
 
-    assert len((out / "compensator.py").read_text().splitlines()) <= 20
+    assert len((out / "compensator.py").read_text().splitlines()) <= 23
     run = [sys.executable, "-W", "error", str(out / "compensator.py")]
     printed = subprocess.run(run, capture_output=True, text=True, check=True).stdout
     without, compensated = (
@@ -92,6 +92,10 @@ def test_the_text_names_what_got_a_loop(capsys: pytest.CaptureFixture[str], tmp_
         main([*arguments, "grip"])
     what = "--command has 1 columns, --measured 2: one tip per actuator"
     assert what in capsys.readouterr().err
+    for commands, tips in ((["motor 1", "2"], ["slide", "grip"]), (["2", "3"], ["grip", "grip"])):
+        with pytest.raises(SystemExit, match="2"):
+            main(["analyze", str(file), "--command", *commands, "--measured", *tips])
+        assert "has a column twice: each degree of freedom has its own" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -113,6 +117,7 @@ def test_the_compensator_names_what_the_record_does_not_know(tmp_path: Path) -> 
         )
     assert "The record has no time: set speed" in texts[0]
     assert "measurement.delays, if time stamps are those of the record [s]: axis_1 0." in texts[1]
+    assert "speed: 2 times that of the record" in texts[1]
     untimed, timed = (load_config(tmp_path / name / "compensator.toml") for name in ("a", "b"))
     assert (untimed.measurement.delays, untimed.dof[0].speed) == ((), None)
     assert timed.measurement.delays == pytest.approx([0.2], abs=0.01)

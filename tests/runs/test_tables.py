@@ -46,6 +46,9 @@ DIALECTS = {
     "titles behind a mark": b"# t,motor,tip\n0,1.5,2\n1,2.5,3\n",
     "titles behind a mark, spaces": b"# t motor tip\n0 1.5 2\n1 2.5 3\n",
     "preamble": b"Rig;7\nOperator;A, B\n\nt;motor;tip\n0;1,5;2\n1;2,5;3\n2;;\n3;;\n",
+    "LabVIEW": b"LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\n"
+    b"***End_of_Header***\t\nChannels\t2\t\t\nSamples\t2\t2\t\nX0\t0.0\t0.0\t\nDelta_X\t1\t1\t\n"
+    b"***End_of_Header***\t\t\t\nt\tmotor\ttip\tComment\n0\t1.5\t2\t\n1\t2.5\t3\t\n",
     "sep=": b"sep=;\nt;motor;tip\n0;1,5;2\n1;2,5;3\n",
     "gzip": gzip.compress(b"t,motor,tip\n0,1.5,2\n1,2.5,3\n"),
     "seconds since the start, in ns": b"t_ns,motor,tip\n5000000000000,1.5,2\n5001000000000,2.5,3\n",

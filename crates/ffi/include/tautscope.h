@@ -150,9 +150,9 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_UNOBSERVABLE = 9,
     // The rig reports that a drive does not follow its command.
     TAUTSCOPE_FLAG_FOLLOWING_ERROR = 10,
-    // The reference jumped: it changed by more than its speed before and `reference_speed` allow.
+    // The reference jumped: it changed by more than its speed before and `reference_speed` or `dof.speed` allow.
     TAUTSCOPE_FLAG_REFERENCE_JUMP = 11,
-    // The reference was faster than `reference_speed` over `reference_time`, and is followed at this speed.
+    // The reference was faster than `reference_speed` or `dof.speed` over `reference_time`, and is followed at this speed.
     TAUTSCOPE_FLAG_REFERENCE_FAST = 12,
     // The reference was older than `reference_age`, or jumped after its device had been silent for as long.
     TAUTSCOPE_FLAG_REFERENCE_LATE = 13,

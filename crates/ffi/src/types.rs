@@ -315,9 +315,9 @@ pub enum TautscopeFlag {
     Unobservable = 9,
     /// The rig reports that a drive does not follow its command.
     FollowingError = 10,
-    /// The reference jumped: it changed by more than its speed before and `reference_speed` allow.
+    /// The reference jumped: it changed by more than its speed before and `reference_speed` or `dof.speed` allow.
     ReferenceJump = 11,
-    /// The reference was faster than `reference_speed` over `reference_time`, and is followed at this speed.
+    /// The reference was faster than `reference_speed` or `dof.speed` over `reference_time`, and is followed at this speed.
     ReferenceFast = 12,
     /// The reference was older than `reference_age`, or jumped after its device had been silent for as long.
     ReferenceLate = 13,

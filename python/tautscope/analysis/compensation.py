@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from tautscope.analysis.compensator import GAP, LONGEST_GAP, compensator, scale_of, tip_interval
+from tautscope.analysis.compensator import (
+    GAP,
+    LONGEST_GAP,
+    MOST_SPEED,
+    Parts,
+    compensator,
+    late_by,
+    scale_of,
+    sensors_of,
+    tip_interval,
+)
 from tautscope.analysis.delayed_play import turns
 from tautscope.analysis.identification import Identification, Interval
 from tautscope.analysis.models import prandtl_ishlinskii
 from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
 from tautscope.analysis.models.task import Floats, extremes
+from tautscope.analysis.setpoints import ramped
 from tautscope.config import Config, from_document
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.safety import MEANINGS, Reaction, by_urgency
 from tautscope.report.metrics import rms
 from tautscope.runs.records import Record
 
@@ -31,6 +47,9 @@ FITTED = 16_000
 """Of a longer record, the plays of the simulation are fitted to at most so many tips, and to the
 extremes of the command in as many parts."""
 PERIOD = Config().control.period
+CHECKED = 20
+"""Ticks from one look at the supervision of the simulated loop to the next."""
+_HELD = Reaction.HOLD_MOTION.rank
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +60,13 @@ class Compensation:
         reference: (n,).
         without: (n,) tip; the command is the reference.
         compensated: (n,) tip with the loop.
+        held: Why the loop held its motion; empty if it did not.
     """
 
     reference: Floats
     without: Floats
     compensated: Floats
+    held: str = ""
 
     @property
     def before(self) -> float:
@@ -60,13 +81,38 @@ class Compensation:
     @property
     def helps(self) -> bool:
         """Whether the loop reduces the error."""
-        return self.after < (1 - LEAST_REDUCTION) * self.before
+        return not self.held and self.after < (1 - LEAST_REDUCTION) * self.before
 
 
-def simulate(record: Record, found: Identification) -> Compensation:
-    """Run the `compensator` of a record on the plays of the same record."""
-    played = as_played(record, found)
-    return run(compensator({"tip": played}), played[0], *plant(record, found))
+def simulate(parts: Parts, name: str) -> Compensation:
+    """Run the `compensator` of some records on plays that are fitted to one of them."""
+    record, found = parts[name]
+    played, late = as_played(record, found)
+    settings = compensator({name: (played, late)})
+    if record.is_timed:
+        rate = float(np.ptp(record.clock[_fastest(record, found)]) / np.ptp(played.clock))
+        settings = _alone(compensator(parts), list(parts).index(name), sensors_of(parts)[0], rate)
+    return run(settings, played, *plant(record, found), max(late_by(played, late), 0.0))
+
+
+def _alone(
+    document: dict[str, Any], index: int, sensors: Sequence[int], rate: float
+) -> dict[str, Any]:
+    """One degree of freedom of a `compensator`, in a time that runs faster by a rate."""
+    dof, motors, usual = document["dof"][index], document["actuators"], Config().safety
+    measurement, safety = dict(document["measurement"]), document.get("safety", {})
+    if "delays" in measurement:
+        measurement["delays"] = [measurement["delays"][sensors[index]] / rate]
+    return document | {
+        "dof": [dof | {"speed": min(dof["speed"] * rate, MOST_SPEED)}],
+        "measurement": measurement,
+        "actuators": {
+            "matrix": [[motors["matrix"][index][index]]],
+            "offsets": [motors["offsets"][index]],
+            "units": [motors["units"][index]],
+        },
+        "safety": {key: max(value / rate, getattr(usual, key)) for key, value in safety.items()},
+    }
 
 
 def plant(record: Record, found: Identification) -> tuple[PrandtlIshlinskii, float]:
@@ -94,7 +140,7 @@ def as_played(record: Record, found: Identification) -> tuple[Record, Identifica
     that is played faster than it is.
     """
     clock = record.clock * (1.0 if record.is_timed else UNTIMED)
-    kept = _fastest_part(record, found, clock)
+    kept = _fastest(record, found)
     speed = max(1.0, float(np.ptp(clock[kept])) / LONGEST)
     time = (clock[kept] - clock[kept][0]) / speed
     scale = (1.0 if record.is_timed else UNTIMED) / speed
@@ -102,8 +148,9 @@ def as_played(record: Record, found: Identification) -> tuple[Record, Identifica
     return replace(record.part(kept), time=time), replace(found, delay=delay)
 
 
-def _fastest_part(record: Record, found: Identification, clock: Floats) -> slice:
-    """`LONGEST` of a clock [s], or `STROKES` strokes if they take longer: the fastest ones."""
+def _fastest(record: Record, found: Identification) -> slice:
+    """`LONGEST` of a record, or `STROKES` strokes if they take longer: the fastest ones."""
+    clock = record.clock * (1.0 if record.is_timed else UNTIMED)
     at = clock[turns(record.command, found.width.value / abs(found.gain))]
     if clock[-1] - clock[0] <= LONGEST or len(at) <= STROKES:
         return slice(None)
@@ -116,32 +163,54 @@ def _fastest_part(record: Record, found: Identification, clock: Floats) -> slice
     return part if has_tips else slice(None)
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without the log messages of a loop, whose motors nobody has."""
+    log = logging.getLogger("tautscope.loop")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
+@_silent()
 def run(
-    settings: dict[str, Any], record: Record, plays: PrandtlIshlinskii, noise: float
+    settings: dict[str, Any],
+    record: Record,
+    plays: PrandtlIshlinskii,
+    noise: float,
+    delay: float | None = None,
 ) -> Compensation:
     """Run a `compensator` of one degree of freedom on plays, with a record's motion as reference.
 
-    The tip is measured as often as in the record, with noise, and arrives late by the delay of the
-    settings, with a time stamp that is as late. The delay belongs to the measurement, not to the
-    motion.
+    The tip is measured as often as in the record, with noise, and arrives late by a delay [s], by
+    default that of the settings, with a time stamp that is as late. The delay belongs to the
+    measurement, not to the motion.
     """
     config = from_document(settings)
     actuators, loop = Actuators(config), HysteresisReduction(config)
     time, scale = record.clock, scale_of(record)
     ticks = np.arange(0, time[-1], PERIOD)
-    motors = np.interp(ticks, time, record.command)
+    motors = np.interp(ticks, time, ramped(record))
     reference = np.array([actuators.dofs([each]) for each in motors.tolist()])
     every = max(1, round(min(tip_interval(record), LONGEST_GAP / GAP) / PERIOD))
-    delay = max(config.measurement.delays, default=0.0)
-    late = round(delay / PERIOD)
+    if delay is None:
+        delay = max(config.measurement.delays, default=0.0)
+    late = math.ceil(delay / PERIOD - 1e-6)
     noises = scale * np.random.default_rng(0).normal(0, noise, len(ticks))
     radii, weights = np.array(plays.radii), scale * plays.direction * np.array(plays.weights)
     tips, outputs = np.empty(len(ticks)), np.full(len(radii), motors[0])
+    held = ""
     for k, now in enumerate(ticks.tolist()):
         motor = actuators.motors(loop.step(reference[k], now))
         outputs = np.minimum(np.maximum(outputs, motor - radii), motor + radii)
         tips[k] = weights @ outputs + scale * plays.offset
         if k % every == 0 and k >= late:
             loop.on_tip([tips[k - late] + noises[k]], float(ticks[k - late]) + delay)
+        if k % CHECKED == 0 and not held and (state := loop.supervision).reaction.rank >= _HELD:
+            held = f"after {now:.3g} s: {MEANINGS[by_urgency(state.flags)[0]]}"
     half = slice(len(ticks) // 2, None)
-    return Compensation(reference[half, 0] / scale, plays.predict(motors)[half], tips[half] / scale)
+    without = plays.predict(motors)[half]
+    return Compensation(reference[half, 0] / scale, without, tips[half] / scale, held)

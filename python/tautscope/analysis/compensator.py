@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tautscope._core import MOST_RANGE
+from tautscope._core import MOST_RANGE, MOST_SENSORS
 from tautscope.analysis.identification import Identification
+from tautscope.analysis.setpoints import ramped
 from tautscope.config import Config
 from tautscope.config.fields import MOST_RATIO
 from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
+Parts = Mapping[str, tuple[Record, Identification]]
+"""Name of a degree of freedom -> its record, and what was identified."""
 MARGIN, HASTE = 1.5, 2.0
 """Width that is compensated, and travel beyond that of the record, over the width found; and speed
 that is followed over that of the record."""
+WINDOW, MOST_WINDOWS = 1 / 8, 100_000
+"""Of a median stroke, over which a speed is measured; and how often."""
+MOST_SPEED = 1000.0
+"""That a configuration may have [m/s or rad/s]."""
 CHANGE_RATE = 0.1
 """Of the law: its default is for images, of which some are wrong; a record has a sensor."""
 GAP, LONGEST_GAP = 3.0, 5.0
@@ -37,6 +44,7 @@ from tautscope.loop.actuators import with_actuators
 
 config = load_config(Path(__file__).with_name("compensator.toml"))
 low, high = np.array([dof.range for dof in config.dof]).T
+sensors = np.array(SENSORS)  # of the degrees of freedom
 for compensate in (False, True):
     rig = with_actuators(PlayRig(config, [dof.expected_width for dof in config.dof]), config)
     loop, sample, errors = HysteresisReduction(config, compensate), rig.reset(), []
@@ -44,7 +52,9 @@ for compensate in (False, True):
         reference = (low + high) / 2 + (high - low) / 4 * np.sin(sample.time)  # [m or rad]
         sample = rig.step(loop.step(reference, sample.time))
         for tip in sample.measurement:  # stamped as in the record: measurement.delays too late
-            loop.on_tip(tip.values, tip.captured_at + max(config.measurement.delays, default=0))
+            for sensor, delay in enumerate(config.measurement.delays or [0.0]):
+                values = np.where(sensors == sensor, tip.values, np.nan)
+                loop.on_tip(values, tip.captured_at + delay, sensor=sensor)
         errors.append(sample.true_state - reference)
     print("compensated:" if compensate else "without:", np.std(errors[-4000:], axis=0))
 '''
@@ -68,23 +78,83 @@ def tip_interval(record: Record) -> float:
 
 def late_by(record: Record, found: Identification) -> float:
     """Delay, if it differs from 0 by more than chance and half a sample, else 0."""
-    clock = record.clock
-    tick = float(clock[-1] - clock[0]) / len(clock)
     delay = found.delay.value
-    return delay if abs(delay) > max(found.delay.half, tick / 2) else 0.0
+    return delay if abs(delay) > _doubt(record, found) else 0.0
 
 
-def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str, Any]:
+def speed_of(record: Record, found: Identification) -> float:
+    """Speed of the command [its unit/s], which it exceeds for 1 % of the time.
+
+    Over `WINDOW` of a stroke: over a sample it is that of the encoder's steps and of time stamps.
+    """
+    clock, command = record.clock, ramped(record)
+    window = WINDOW * min(found.stroke, float(clock[-1] - clock[0]))
+    begins = np.linspace(clock[0], clock[-1] - window, MOST_WINDOWS)
+    moved = np.interp(begins + window, clock, command) - np.interp(begins, clock, command)
+    return float(np.quantile(np.abs(moved), 0.99)) / window
+
+
+def _doubt(record: Record, found: Identification) -> float:
+    """By which a delay is uncertain: half its interval, and at least half a sample."""
+    clock = record.clock
+    return max(found.delay.half, float(clock[-1] - clock[0]) / len(clock) / 2)
+
+
+def sensors_of(parts: Parts) -> tuple[list[int], list[float]]:
+    """The sensor of each degree of freedom, and the delay of each sensor [s]; none if all are 0.
+
+    Tips are of one sensor unless their delays differ by more than their uncertainty. Of more than
+    `MOST_SENSORS` delays the nearest become one.
+    """
+    late = _late(parts)
+    if not any(late):
+        return [0] * len(late), []
+    doubts = [_doubt(*part) for part in parts.values()]
+    groups: list[list[int]] = []
+
+    def delay(group: Sequence[int]) -> float:
+        return float(np.mean([late[each] for each in group]))
+
+    for each in np.argsort(late, kind="stable").tolist():
+        last = groups[-1][-1] if groups else each
+        if not groups or late[each] - late[last] > doubts[each] + doubts[last]:
+            groups.append([])
+        groups[-1].append(each)
+    while len(groups) > MOST_SENSORS:
+        k = int(np.argmin(np.diff([delay(group) for group in groups])))
+        groups[k : k + 2] = [groups[k] + groups[k + 1]]
+    groups.sort(key=min)
+    sensors = [[each in group for group in groups].index(True) for each in range(len(late))]
+    return sensors, [delay(group) for group in groups]
+
+
+def shared_delays(parts: Parts) -> dict[str, float]:
+    """Delays of `sensors_of` [s] that are not those of the degrees of freedom that have them."""
+    sensors, delays = sensors_of(parts)
+    if len(delays) < MOST_SENSORS:
+        return {}
+    given = dict(zip(parts, [delays[sensor] for sensor in sensors], strict=True))
+    own = dict(zip(parts, _late(parts), strict=True))
+    return {
+        name: delay
+        for name, delay in given.items()
+        if abs(delay - own[name]) > 2 * _doubt(*parts[name])
+    }
+
+
+def _late(parts: Parts) -> list[float]:
+    """Delays of tips [s], 0 where they are not known."""
+    return [max(late_by(*part), 0.0) if part[0].is_timed else 0.0 for part in parts.values()]
+
+
+def compensator(parts: Parts) -> dict[str, Any]:
     """Configuration of the loop for identified slack, as a document of TOML.
 
     The loop's unit is m or rad, with the tip's zero; its command is a tip in the middle of the
     slack, and [actuators] turns it into the record's motors. Speeds and delays are those of the
     record's time, and left out if it has none.
-
-    Args:
-        parts: Name of a degree of freedom -> its record, and what was identified.
     """
-    usual, dofs, noises, delays = Config(), [], [], []
+    usual, dofs, noises = Config(), [], []
     gap = usual.safety.frame_gap
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
@@ -102,10 +172,8 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
             "range": [low, high],
         }
         if record.is_timed:
-            steps = np.diff(record.clock)
-            speeds = np.abs(np.diff(path))[steps > 0] / steps[steps > 0]
-            dof["speed"] = min(HASTE * float(np.quantile(speeds, 0.99)) + limit / 10, 1000.0)
-            delays.append(max(late_by(record, found), 0.0))
+            speed = abs(scale * found.gain) * speed_of(record, found)
+            dof["speed"] = min(HASTE * speed + limit / 10, MOST_SPEED)
             gap = max(gap, min(GAP * tip_interval(record), LONGEST_GAP))
         dofs.append(dof)
         noises.append(scale * found.noise / limit)
@@ -120,8 +188,9 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
         "actuators": {"matrix": np.diag(gains).tolist(), "offsets": offsets, "units": units},
     }
     safety = {"frame_gap": gap} if gap > usual.safety.frame_gap else {}
-    if any(delays):
-        document["measurement"]["delays"] = [float(np.mean(delays))]
+    _, delays = sensors_of(parts)
+    if delays:
+        document["measurement"]["delays"] = delays
         age = max(usual.safety.frame_age, 1.5 * max(delays))
         safety["frame_age"] = min(age, usual.control.history)
     if safety:
@@ -129,13 +198,17 @@ def compensator(parts: Mapping[str, tuple[Record, Identification]]) -> dict[str,
     return {name: _rounded(section) for name, section in document.items()}
 
 
-def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
+def notes(parts: Parts) -> list[str]:
     """What a person has to check in a `compensator`."""
     found = [
         "[[dof]] is in m or rad, with the tip's zero; [actuators] has the motors of the record.",
         f"range: motion of the record and {MARGIN:g} slacks more. May your motors go there?",
         f"law.change_rate: for a sensor that is never wrong, else {Config().law.change_rate:g}.",
     ]
+    if any(record.is_timed for record, _ in parts.values()):
+        found.append(
+            f"speed: {HASTE:g} times that of the record; a faster reference is held to it."
+        )
     for name, (record, _) in parts.items():
         unit, scale = record.units[1], scale_of(record)
         if scale != (LENGTHS.get(unit) or ANGLES.get(unit)):
@@ -148,12 +221,15 @@ def notes(parts: Mapping[str, tuple[Record, Identification]]) -> list[str]:
     if any(delay > 0 for delay in late.values()):
         each = ", ".join(f"{name} {delay:.3g}" for name, delay in late.items())
         found.append(f"measurement.delays, if time stamps are those of the record [s]: {each}")
+    sensors, delays = sensors_of(parts)
+    if len(delays) > 1:
+        of = ", ".join(f"{name} {k}" for name, k in zip(parts, sensors, strict=True))
+        what = "its tips come with this number (sensor), NaN for what others measure"
+        found.append(f"Sensor of measurement.delays, from 0 on: {of}; {what}")
     return found
 
 
-def write_compensator(
-    parts: Mapping[str, tuple[Record, Identification]], folder: Path
-) -> dict[str, Any]:
+def write_compensator(parts: Parts, folder: Path) -> dict[str, Any]:
     """Write compensator.toml and compensator.py into a folder; the configuration."""
     import tomlkit  # noqa: PLC0415  only writing needs it
 
@@ -161,7 +237,8 @@ def write_compensator(
     comments = "".join(f"# {note}\n" for note in notes(parts))
     text = f"{comments}\n{tomlkit.dumps(document)}"
     (folder / "compensator.toml").write_text(text, encoding="utf-8")
-    (folder / "compensator.py").write_text(PROGRAM, encoding="utf-8")
+    program = PROGRAM.replace("SENSORS", str(sensors_of(parts)[0]))
+    (folder / "compensator.py").write_text(program, encoding="utf-8")
     return document
 
 

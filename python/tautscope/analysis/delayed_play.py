@@ -51,7 +51,7 @@ class Signals:
         kept = np.union1d(seen[:: -(-len(seen) // SAMPLES)], np.arange(0, len(command), size))
         self.time, self.measured = time[kept], measured[kept]
         self.extent = float(np.ptp(command))
-        self.resolution = float(np.min(np.diff(np.unique(measured[seen])), initial=np.inf))
+        self.resolution = resolution(measured[seen])
         at = time[turns(command, _TURN * self.extent)]
         strokes = np.diff(at)
         duration = float(time[-1] - time[0])
@@ -120,6 +120,12 @@ class Signals:
         gram = scaled.T @ scaled
         weights = np.linalg.lstsq(gram, scaled.T @ self.target, rcond=1e-12)[0] / scale
         return weights, columns @ weights - self.target
+
+
+def resolution(values: Floats) -> float:
+    """Least step between values that differ by more than rounding; infinite if all are equal."""
+    steps = np.diff(np.unique(values))
+    return float(np.min(steps[steps > 1e-9 * np.sum(steps)], initial=np.inf))
 
 
 def turns(values: Floats, least: float) -> NDArray[np.intp]:

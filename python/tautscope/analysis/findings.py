@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.analysis.delayed_play import resolution
 from tautscope.analysis.identification import Identification, identify
 from tautscope.analysis.models.task import Floats, fit_samples
 from tautscope.runs.records import LONGEST_INTERVAL, Record
@@ -25,6 +26,7 @@ SPIKE = 0.3
 """Least height of an outlier, as a share of the range."""
 FEW = 1e-3
 """Share of samples that may repeat a value by chance, and do not matter."""
+CURVE = "it follows the command in a curve"
 CURVED = 0.8
 """Error that a cubic leaves, over that of a line, below which the relation is curved."""
 _FACTORS = {
@@ -128,11 +130,13 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
         for end, sign in ends.items()
         if np.mean(sign * error[measured == end]) > 0.05 * other.noise + 0.002 * extent
     ]
+    # A sensor repeats a value until the tip has moved by half a step.
+    allowed = 4 * other.noise + 0.01 * extent + resolution(measured[seen]) / 2
     repeated, at_end = [], []
     for a, b in _runs(is_held):
         if measured[a] in passed:
             at_end.append((a, b))
-        elif np.max(np.abs(error[a : b + 1])) > 4 * other.noise + 0.01 * extent:
+        elif np.max(np.abs(error[a : b + 1])) > allowed:
             repeated.append((a, b))
     if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * held:
         return record, found, []
@@ -188,7 +192,7 @@ def curve_finding(record: Record, found: Identification) -> Finding | None:
     off = float(np.max(np.abs(curve)))
     if off < 0.02 * extent:
         return None
-    return Finding("tip", f"it follows the command in a curve, up to {off:.3g} off a line")
+    return Finding("tip", f"{CURVE}, up to {off:.3g} off a line")
 
 
 def _time_findings(record: Record) -> Iterator[Finding]:
@@ -201,6 +205,13 @@ def _time_findings(record: Record) -> Iterator[Finding]:
             "time",
             f"a sample every {interval:.4g} s is implausible: if the column is in ms, "
             "write its title as time [ms]",
+        )
+    is_whole = 1 <= interval <= LONGEST_INTERVAL and interval.is_integer()
+    if is_whole and not record.time_unit and np.mean(steps == interval) > 0.9:
+        yield Finding(
+            "time",
+            f"it rises by {interval:g} a line: these look like sample numbers, not seconds; "
+            "if they are seconds, write its title as time [s]",
         )
     equal = np.count_nonzero(steps == 0)
     if equal > 0.1 * len(steps):

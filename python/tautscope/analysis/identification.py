@@ -32,6 +32,8 @@ LEAST_ADVANTAGE = 1.05
 EARLY = 1.25
 """Error without a delay, over that of a tip before its command, which is one of the time stamps:
 below it the tip's loop has other corners than those of the model."""
+EXCHANGE = "exchange --command and --measured if they are swapped, or correct the time stamps"
+"""What to do where a tip moves before its command."""
 MOST_STROKES = 10
 """Times the strokes of a record that a person can be asked for."""
 _LARGEST = 0.49
@@ -73,6 +75,7 @@ class Identification:
         p_value: Share of surrogates, tips that have nothing to do with the command, that the model
             explains at least as well.
         is_at_limit: Whether width or delay is at the end of the search.
+        stroke: Median time of a stroke of the command [s, or samples without a time].
     """
 
     width: Interval
@@ -88,6 +91,7 @@ class Identification:
     strokes: int
     p_value: float
     is_at_limit: bool
+    stroke: float
 
     @property
     def missing(self) -> str:
@@ -116,6 +120,8 @@ class Identification:
                 "check that the two columns belong together, then record strokes several times "
                 "as long as the slack",
             )
+        if self.is_early and self.width.half > LARGEST_UNCERTAINTY * self.width.value:
+            return "the tip moves before its command", EXCHANGE
         if self.explanations["a lag"] < LEAST_ADVANTAGE * self.noise:
             return (
                 "a lag without slack explains the record as well",
@@ -125,8 +131,10 @@ class Identification:
             limit = "the best fit is at the limit of the search"
             what = limit if self.is_at_limit else "the record fits any width"
             return what, "record longer and slower strokes"
-        if self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
-            return "", ""
+        is_known = self.width.half <= LARGEST_UNCERTAINTY * self.width.value
+        return ("", "") if is_known else self._doubt()
+
+    def _doubt(self) -> tuple[str, str]:
         least = 1e-9 * self.width.half  # for a width of 0
         excess = self.width.half / (LARGEST_UNCERTAINTY * max(self.width.value, least))
         often = f"about {math.ceil(excess**2 * self.strokes)} strokes in place of {self.strokes}"
@@ -137,6 +145,15 @@ class Identification:
             f"not known to ± {100 * LARGEST_UNCERTAINTY:.0f} %",
             f"record {often}, each several times as long as the slack, at two speeds",
         )
+
+    @property
+    def is_early(self) -> bool:
+        """Whether the tip moves before its command, by more than clocks that differ a little.
+
+        A lead by a share of a stroke hides a slack of about that share of the tip's range: up to
+        `NEGLIGIBLE` of it nothing is lost by taking it for an offset of clocks.
+        """
+        return self.delay.high < -NEGLIGIBLE * self.stroke
 
     @property
     def is_related(self) -> bool:
@@ -160,6 +177,7 @@ class Identification:
             not self.is_identified
             and self.is_related
             and not self.is_at_limit
+            and not self.is_early
             and self.width.value <= 2 * self.width.half
             and self.width.high <= NEGLIGIBLE * float(np.ptp(self.predicted - self.drift))
         )
@@ -257,6 +275,7 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
         strokes=len(_stroke_ends(signals, found)) + 1,
         p_value=p_value,
         is_at_limit=bool(is_at_limit),
+        stroke=signals.stroke,
     )
 
 

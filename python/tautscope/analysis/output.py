@@ -17,7 +17,7 @@ from tautscope.analysis.compensator import write_compensator
 from tautscope.analysis.models.registry import LINEAR_FIT
 from tautscope.analysis.models.task import Floats
 from tautscope.analysis.slide import slide, thinned
-from tautscope.analysis.verdict import Verdict
+from tautscope.analysis.verdict import Verdict, parts_of
 from tautscope.figure_style import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
 
@@ -42,8 +42,7 @@ def write_results(
             own = place if len(results) == 1 else place / verdict.name
             own.mkdir(exist_ok=True)
             _write_one(verdict, analysis, own)
-        known = [verdict for verdict, _ in results if verdict.settings is not None]
-        parts = {verdict.name: (verdict.record, verdict.found) for verdict in known}
+        parts = parts_of(verdict for verdict, _ in results)
         return write_compensator(parts, place) if parts else None
 
 

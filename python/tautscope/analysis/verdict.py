@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from tautscope._core import MOST_SENSORS
 from tautscope.analysis.comparison import check_motion
 from tautscope.analysis.compensation import Compensation, simulate
-from tautscope.analysis.compensator import compensator, late_by
+from tautscope.analysis.compensator import Parts, compensator, late_by, shared_delays
 from tautscope.analysis.findings import (
+    CURVE,
     Finding,
     curve_finding,
     gain_finding,
     identify_without_repeats,
     without_errors,
 )
-from tautscope.analysis.identification import Identification, Interval
+from tautscope.analysis.identification import EXCHANGE, Identification, Interval
+from tautscope.analysis.setpoints import held_for
 from tautscope.report.tables import finite
 from tautscope.runs.records import Record
 
@@ -75,10 +79,17 @@ class Verdict:
             before, after = self.compensation.before, self.compensation.after
             verb = "would fall" if self.helps else "would not fall"
             parts.append(
-                f"With the loop the tip's RMS error {verb} from {self._number(before)} to "
+                "What the loop would reach is not known: simulated with this record's motion it "
+                f"stopped {self.compensation.held}"
+                if self.compensation.held
+                else f"With the loop the tip's RMS error {verb} from {self._number(before)} to "
                 f"{self._number(after)}, simulated on plays fitted to this record, with its delay "
                 "and noise."
             )
+            if late_by(self.record, self.found) > 0:
+                parts.append(
+                    "This holds if the delay is the sensor's; a tip that itself lags stays late."
+                )
         listed = "; ".join(str(finding) for finding in self.findings)
         parts.append(
             f"Found in the record: {listed}." if listed else "Nothing is wrong with the samples."
@@ -154,17 +165,31 @@ class Verdict:
 
     def _next(self) -> str:
         found = self.found
-        if found.is_identified and self.helps:
-            late = late_by(self.record, found) if self.record.is_timed else 0.0
-            stamps = "; its measurement.delays is for time stamps as in the record"
-            return f"run compensator.toml{stamps if late > 0 else ''}"
         if found.is_identified:
-            return "measure the tip more often, earlier or with less noise, and record again"
+            return self._use()
         if found.is_aligned:
             if self._is_late:
                 return f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
             return "command the motor directly; the error that remains is not slack"
+        if found.is_related and any(CURVE in each.what for each in self.findings):
+            return (
+                "record strokes where the tip follows the command in a line, away from ends and "
+                "dead bands: more strokes through the curve make the width no clearer"
+            )
         return found.remedy
+
+    def _use(self) -> str:
+        """What to do with a slack that is identified."""
+        found = self.found
+        if found.is_early:
+            return EXCHANGE
+        if self.helps:
+            late = late_by(self.record, found) if self.record.is_timed else 0.0
+            stamps = "; its measurement.delays is for time stamps as in the record"
+            return f"run compensator.toml{stamps if late > 0 else ''}"
+        if self.compensation is not None and self.compensation.held:
+            return "try compensator.toml with a smooth reference, or record a slower motion"
+        return "measure the tip more often, earlier or with less noise, and record again"
 
 
 def judge(
@@ -184,6 +209,13 @@ def judge(
     check_motion(record)
     record, found, repeated = identify_without_repeats(record)
     findings += repeated
+    if held := held_for(record):
+        unit = "s" if record.is_timed else "samples"
+        what = (
+            f"it is setpoints, each held for {held:.2g} {unit}, which the motor follows in its own "
+            "way: record the motor's own position"
+        )
+        findings.append(Finding("command", what))
     if found.is_identified or found.is_aligned:
         drift, extent = float(np.ptp(found.drift)), float(np.ptp(found.predicted))
         if drift > max(3 * found.noise, 0.03 * extent):
@@ -191,16 +223,51 @@ def judge(
     if found.is_related:
         more = gain_finding(record, found.gain), curve_finding(record, found)
         findings += [each for each in more if each is not None]
+        if found.is_early:
+            unit = "s" if record.is_timed else "samples"
+            what = (
+                f"it moves {-found.delay.value:.3g} {unit} before its command: are --command and "
+                "--measured swapped, or the motor's time stamps late?"
+            )
+            findings.append(Finding("tip", what))
     is_used = found.is_identified
+    parts = {name: (record, found)}
     return Verdict(
         name,
         columns,
         record,
         found,
         tuple(findings),
-        simulate(record, found) if is_used else None,
-        compensator({name: (record, found)}) if is_used else None,
+        simulate(parts, name) if is_used else None,
+        compensator(parts) if is_used else None,
     )
+
+
+def parts_of(verdicts: Iterable[Verdict]) -> Parts:
+    """What a `compensator` for these verdicts is made from: those whose slack is identified."""
+    return {each.name: (each.record, each.found) for each in verdicts if each.found.is_identified}
+
+
+def together(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Verdicts that say what one loop of all would do, which has settings in common."""
+    parts = parts_of(verdicts)
+    if len(parts) < 2:
+        return list(verdicts)
+    shared = shared_delays(parts)
+
+    def one(verdict: Verdict) -> Verdict:
+        if verdict.name not in parts:
+            return verdict
+        findings = verdict.findings
+        if verdict.name in shared:
+            what = (
+                f"compensator.toml has a delay of {shared[verdict.name]:.3g} s for it, since the "
+                f"loop has at most {MOST_SENSORS} sensors: analyze fewer columns at once"
+            )
+            findings += (Finding("tip", what),)
+        return replace(verdict, findings=findings, compensation=simulate(parts, verdict.name))
+
+    return [one(verdict) for verdict in verdicts]
 
 
 def plus_minus(interval: Interval) -> str:

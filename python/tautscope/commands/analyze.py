@@ -127,6 +127,10 @@ def _run(options: argparse.Namespace) -> int:
             "one tip per actuator"
         )
     episodes, sheet = _open(options)
+    commands = [sheet.index(each) for each in options.command]
+    for name, chosen in (("command", commands), ("measured", options.measured)):
+        if len(set(chosen)) < len(chosen):
+            options.usage_error(f"--{name} has a column twice: each degree of freedom has its own")
     if episodes and options.episode is None:
         names = _names([sheet.titles[sheet.index(tip)] for tip in options.measured])
         analyze_episodes.analyze_episodes(options, episodes, names)
@@ -159,7 +163,7 @@ def _open(options: argparse.Namespace) -> tuple[list[Episode], Sheet]:
 def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, Analysis]]:
     """Verdict and comparison of models per degree of freedom; the file is read once."""
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
-    from tautscope.analysis.verdict import judge  # noqa: PLC0415
+    from tautscope.analysis.verdict import judge, together  # noqa: PLC0415
 
     config = load_config(options.config)
     tips = sheet if options.tip_file is None else open_table(options.tip_file)
@@ -195,7 +199,8 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
                 progress=report,
             )
             results.append((verdict, analysis))
-    return results
+    verdicts = together([verdict for verdict, _ in results])
+    return [(verdict, analysis) for verdict, (_, analysis) in zip(verdicts, results, strict=True)]
 
 
 def _names(titles: Sequence[str]) -> list[str]:

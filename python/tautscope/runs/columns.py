@@ -62,6 +62,9 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
 
     A pair is proposed if its values are correlated; names such as motor and tip come first. Which
     of two is the command follows from their names, else from which of them lags.
+
+    Raises:
+        RecordError: No column has numbers.
     """
     columns, moving = [], {}
     time = time_column(sheet.titles)
@@ -81,6 +84,9 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
         is_counter = np.all(np.diff(seen) > 0)
         if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
             moving[name] = filled(values)[:: -(-len(values) // _ENOUGH)]
+    if not columns and len(sheet.rows):
+        begin = f"no column of numbers: the data begin at {sheet.line} {sheet.rows[0]}"
+        raise RecordError(sheet.file, begin, "numbers below a line of titles")
     own = _components(sheet.titles)
     pairs = [
         (strength, *_ordered(one, other, moving))

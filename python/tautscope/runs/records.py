@@ -63,6 +63,7 @@ class Record:
         rows: (n,) line of the file of each sample.
         cleaning: What the cleaning did.
         units: Units of command and measured, as the file names them; empty where it does not.
+        time_unit: That of the time, "s" of dates; empty where the file does not name it.
     """
 
     command: Floats
@@ -71,6 +72,7 @@ class Record:
     rows: NDArray[np.int64]
     cleaning: Cleaning
     units: tuple[str, str] = ("", "")
+    time_unit: str = ""
 
     @property
     def is_timed(self) -> bool:
@@ -146,9 +148,11 @@ def read_record(
         )
         order = np.argsort(table[:, 2], kind="stable")
         table, rows = table[order], np.concatenate([motor_rows, tip_rows])[order]
-        units = motor_units + tip_units
+        units = motor_units[:1] + tip_units
+    time_unit = "" if time is None else units[-1]
     if time is not None and np.nanmin(table[:, 2]) > SINCE_1970:
         table[:, 2] -= np.floor(np.nanmin(table[:, 2]))
+        time_unit = "s"
     table[:, :2][np.isin(table[:, :2], missing)] = np.nan
     is_blank = (
         np.isnan(table[:, 0])
@@ -161,7 +165,7 @@ def read_record(
     record = _clean(table, rows, int(np.count_nonzero(is_blank)))
     allowed = "at least 2 at times at which the command is known: a time of one clock"
     _check_count(tips, measured, record.measured, allowed)
-    return replace(record, units=(units[0], units[1]))
+    return replace(record, units=(units[0], units[1]), time_unit=time_unit)
 
 
 def _check_count(sheet: Sheet, name: str, values: Floats, allowed: str) -> None:
@@ -186,7 +190,7 @@ def _read(
             allowed = f"one of {', '.join(TIMES)}"
             raise RecordError(f"{sheet.file}, column {time}", f"unit {unit}", allowed)
         table[:, -1] = stamps * (TIMES[unit] if unit else time_scale(float(np.nanmedian(stamps))))
-    units = tuple(found.units.get(name, "") for name in names)
+    units = tuple(found.units.get(name, "") for name in wanted)
     return table, found.rows, units, 0 if time is None else found.starts[time]
 
 

@@ -19,6 +19,7 @@ NO_VALUE = ("", "nan", "na", "n/a", "null", "none", "-")
 _LEFT_OUT = re.compile(rb"^[ \t]*(?:$|#|%|//)", re.MULTILINE)
 _MARK = re.compile(r"^\s*(?:#+|%+|//+)\s*")
 _SEPARATOR = re.compile(rb'"?sep=(.)"?\n', re.IGNORECASE)
+_END_OF_HEADER = b"***End_of_Header***"  # of LabVIEW, once or twice
 _HEAD = 100  # lines by which the table is recognised
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _VALUE = re.compile(
@@ -62,8 +63,12 @@ def split_table(data: bytes, file: str) -> TableText:
     data = _as_utf8(_unpacked(data, file), file).rstrip()
     above = 0
     forced = None
+    header, end, rest = data.rpartition(_END_OF_HEADER)
+    if end:
+        _, _, data = rest.partition(b"\n")
+        above = header.count(b"\n") + 1
     if match := _SEPARATOR.match(data):
-        data, forced, above = data[match.end() :], match[1].decode(), 1
+        data, forced, above = data[match.end() :], match[1].decode(), above + 1
     lines = data.split(b"\n") if _LEFT_OUT.search(data) else None
     kept = None if lines is None else [k for k, x in enumerate(lines) if not _LEFT_OUT.match(x)]
     if not data or kept == []:

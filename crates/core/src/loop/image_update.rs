@@ -9,7 +9,7 @@ use crate::r#loop::any_loop::BandLoop;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
 use crate::r#loop::observation::Observation;
 use crate::r#loop::profile::{BandProfile, BandsView, Image, Profile, Seen};
-use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::reduction::{Determined, HysteresisReduction};
 use crate::r#loop::report::{GeometryEstimate, Report, Status};
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
@@ -97,7 +97,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         }
         let Some((measurement, view)) = observation.measure(&self.profile, &past) else {
             // The model predicts no features at the predicted state.
-            let is_missing = self.is_missing(past.travel, [false; N]);
+            let is_missing = self.is_missing(past.travel, [false; N], sensor);
             let missed = if I::IS_WHOLE {
                 Flags::of(Flag::Lost)
             } else {
@@ -123,7 +123,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let is_learnt = I::IS_WHOLE || !measurement.has_outlier;
         let determined = measurement.observable.map(|own| own && is_learnt);
         self.monitors.determine(determined, sensor);
-        let is_missing = self.is_missing(past.travel, determined);
+        let is_missing = self.is_missing(past.travel, determined, sensor);
         // Values of a sensor that were not measured leave a DOF open, as another sensor would.
         let is_part = I::IS_WHOLE || measurement.has_outlier;
         let part = if is_part {
@@ -170,15 +170,26 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 
     /// Whether no measurement has determined a DOF while it may have moved far (N,) [m or rad].
-    fn is_missing(&mut self, travel: [f64; N], observable: [bool; N]) -> bool {
-        for ((at, travel), is_observable) in
-            self.determined_at.iter_mut().zip(travel).zip(observable)
+    ///
+    /// Of a DOF that another sensor measures counts its motion since that measurement arrived: one that is later than this
+    /// sensor's cannot tell of the motion meanwhile.
+    fn is_missing(&mut self, travel: [f64; N], observable: [bool; N], sensor: usize) -> bool {
+        let travels = travel.into_iter().zip(self.travel);
+        for ((last, (at, arrived)), is_observable) in
+            self.determined.iter_mut().zip(travels).zip(observable)
         {
-            if is_observable || at.is_nan() {
-                *at = travel;
+            if is_observable || last.at.is_nan() {
+                *last = Determined {
+                    at,
+                    arrived,
+                    sensor,
+                };
             }
         }
-        let unseen = zip_with(travel, self.determined_at, |travel, at| travel - at);
+        let unseen = zip_with(travel, self.determined, |travel, last| {
+            let is_own = last.sensor == sensor;
+            travel - if is_own { last.at } else { last.arrived }
+        });
         self.monitors.is_far(unseen)
     }
 

@@ -23,9 +23,27 @@ pub struct HysteresisReduction<P, S = [Entry; 256], V = FeatureModel, const N: u
     pub(super) monitors: Monitors<N>,
     /// Time of capture of the last measurement of each sensor that was used.
     pub(super) last_used: [f64; SENSORS],
-    /// Travel [m or rad] at the last measurement that determined each DOF, at the first one before there is one.
-    pub(super) determined_at: [f64; N],
-    travel: [f64; N],
+    /// The last measurement that determined each DOF, the first one before there is one.
+    pub(super) determined: [Determined; N],
+    /// Travel of each DOF so far [m or rad].
+    pub(super) travel: [f64; N],
+}
+
+/// A measurement that determined a DOF.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Determined {
+    /// Travel of the DOF [m or rad] when it was measured, and when the measurement arrived.
+    pub at: f64,
+    pub arrived: f64,
+    pub sensor: usize,
+}
+
+impl Determined {
+    const NEVER: Self = Self {
+        at: f64::NAN,
+        arrived: f64::NAN,
+        sensor: 0,
+    };
 }
 
 impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
@@ -68,7 +86,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
             history: History::new(control.history, control.period, storage)?,
             monitors,
             last_used: [f64::NEG_INFINITY; SENSORS],
-            determined_at: [f64::NAN; N],
+            determined: [Determined::NEVER; N],
             travel: [0.0; N],
         })
     }

@@ -57,9 +57,9 @@ flags! {
     Unobservable = "unobservable",
     /// The rig reports that a drive does not follow its command.
     FollowingError = "following_error",
-    /// The reference jumped: it changed by more than its speed before and `reference_speed` allow.
+    /// The reference jumped: it changed by more than its speed before and `reference_speed` or `dof.speed` allow.
     ReferenceJump = "reference_jump",
-    /// The reference was faster than `reference_speed` over `reference_time`, and is followed at this speed.
+    /// The reference was faster than `reference_speed` or `dof.speed` over `reference_time`, and is followed at this speed.
     ReferenceFast = "reference_fast",
     /// The reference was older than `reference_age`, or jumped after its device had been silent for as long.
     ReferenceLate = "reference_late",
