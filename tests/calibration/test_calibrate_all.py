@@ -203,7 +203,7 @@ def test_the_twin_is_calibrated_from_camera_to_motion(
     assert abs(config.camera.fx - actual.camera.fx) < 1
     assert abs(config.camera.source.delay - actual.twin.sensor.stamp_error) < 0.05
     notes = json.loads(Path("out/motion.json").read_text())["notes"]
-    true = [float(note.split()[3]) for note in notes if "true slack" in note]
+    true = [float(note.split()[4]) for note in notes if "true remaining slack" in note]
     # Without compensation: about 10 mm, 1.8 rad and 1.1 rad.
     assert true[0] < 4
     assert true[1] < 0.6
