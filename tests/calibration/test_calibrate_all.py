@@ -100,7 +100,14 @@ def test_an_interrupted_sequence_is_resumed(
     assert config.calibration.colour is not None
     assert config.calibration.colour.std == {"camera.fx": 0.5}
     report = Path("out/report.html").read_text()
-    for text in ("camera is known", "colour is known", "it moved", "F&lt;1&gt;", "data:image/png"):
+    for text in (
+        "camera is known",
+        "colour is known",
+        "it moved",
+        "F&lt;1&gt;",
+        "data:image/png",
+        "<details>",
+    ):
         assert text in report
     # A finished sequence is not resumed.
     assert main([*COMMAND, "--yes", "--out", "again"]) == 0

@@ -13,10 +13,10 @@ import msgspec
 
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands.arguments import article_config
-from tautscope.config import Config, dump_config
+from tautscope.config import Config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
-from tautscope.report.report import document, embedded
+from tautscope.report.report import configuration, document, embedded
 
 
 class SessionState(msgspec.Struct, forbid_unknown_fields=True):
@@ -120,7 +120,7 @@ class CalibrationSession:
                 parts.append(_table(found["values"], found["std"]))
             for file, caption in found["figures"]:
                 parts.append(embedded((self.folder / file).read_bytes(), "png", caption))
-        parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
+        parts.append(configuration(self.config))
         kind = "a simulated rig" if self.state.seed is not None else "the rig"
         return document("Calibration", f"Calibration of {kind} of {self._file}.", "\n".join(parts))
 

@@ -105,8 +105,8 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
             replayed = codec.update(clock, now, seen, report, count)
             comparison.updates += 1
-            update = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
-            comparison.same_updates += _is_same(comparison, event, replayed, update)
+            name = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
+            comparison.same_updates += _is_same(comparison, event, replayed, name)
         else:
             missing = "an image" if event is not None else "a tick, update or request"
             after = f"after the {where}" if where else "at the start"
