@@ -91,6 +91,11 @@ Motor = Dof | NamedMotor
 """A motor by index, name and unit."""
 
 
+def unit(dof: NamedDof) -> str:
+    """The unit of its values: m or rad."""
+    return "m" if dof.display_unit == "mm" else dof.display_unit
+
+
 def display_text(values: Iterable[float], dofs: Iterable[NamedDof] = Dof) -> str:
     """Values (n,) [m or rad] with their display units: ``9.81 mm, 1.76 rad, 1.02 rad``."""
     return ", ".join(

@@ -14,8 +14,9 @@ from tautscope.calibration.geometry import sweep
 from tautscope.calibration.result import CalibrationResult
 from tautscope.cli import main
 from tautscope.commands import calibration_session, calibration_steps, question
+from tautscope.commands.calibration_rig import twin_config
 from tautscope.commands.calibration_steps import Step
-from tautscope.config import Config, load_config
+from tautscope.config import CameraConfig, Config, load_config
 from tautscope.config.load import config_file
 from tautscope.errors import CalibrationError
 from tautscope.twin.drawn_rig import draw_rig
@@ -38,6 +39,7 @@ class Steps:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.failing: set[str] = set()
         self.seen: list[tuple[str, float]] = []
+        self.twins: list[CameraConfig] = []
         names = ("camera", "colour", "motion")
         steps = tuple(Step(name, f"The {name}", "Nothing.", self._of(name)) for name in names)
         monkeypatch.setattr(calibration_steps, "STEPS", steps)
@@ -45,6 +47,8 @@ class Steps:
     def _of(self, name: str):  # type: ignore[no-untyped-def]
         def run(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
             self.seen.append((name, config.camera.fx))
+            if options.twin:
+                self.twins.append(twin_config(options, config).camera)
             if name in self.failing:
                 error = CalibrationError(f"{name} failed", "Try again")
                 error.add_note("A motor may still move")
@@ -96,7 +100,14 @@ def test_an_interrupted_sequence_is_resumed(
     assert config.calibration.colour is not None
     assert config.calibration.colour.std == {"camera.fx": 0.5}
     report = Path("out/report.html").read_text()
-    for text in ("camera is known", "colour is known", "it moved", "F&lt;1&gt;", "data:image/png"):
+    for text in (
+        "camera is known",
+        "colour is known",
+        "it moved",
+        "F&lt;1&gt;",
+        "data:image/png",
+        "<details>",
+    ):
         assert text in report
     # A finished sequence is not resumed.
     assert main([*COMMAND, "--yes", "--out", "again"]) == 0
@@ -159,6 +170,11 @@ def test_a_step_that_fails_on_the_twin_ends_the_sequence(steps: Steps, capsys: C
     assert main([*COMMAND, "--twin", "--out", "out"]) == 2
     assert "colour failed" in capsys.readouterr().err
     assert [name for name, _ in steps.seen] == ["camera", "colour"]
+    steps.failing = set()
+    assert main([*COMMAND, "--twin"]) == 0
+    # All steps have the same twin, also when resumed, whatever has been written.
+    assert steps.seen[-1] == ("motion", 403)
+    assert steps.twins == [steps.twins[0]] * 4
 
 
 def test_another_rig_and_a_damaged_state_are_refused(steps: Steps, capsys: Capture) -> None:
@@ -194,7 +210,7 @@ def test_the_twin_is_calibrated_from_camera_to_motion(
     assert abs(config.camera.fx - actual.camera.fx) < 1
     assert abs(config.camera.source.delay - actual.twin.sensor.stamp_error) < 0.05
     notes = json.loads(Path("out/motion.json").read_text())["notes"]
-    true = [float(note.split()[3]) for note in notes if "true slack" in note]
+    true = [float(note.split()[4]) for note in notes if "true remaining slack" in note]
     # Without compensation: about 10 mm, 1.8 rad and 1.1 rad.
     assert true[0] < 4
     assert true[1] < 0.6

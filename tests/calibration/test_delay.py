@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
-from tautscope.calibration.delay import estimate_delay
+from tautscope.calibration.delay import Probe, _combined, _move_at_once, estimate_delay
 from tautscope.calibration.delay_probes import Signal
 from tautscope.calibration.tip_states import tip_states
 from tautscope.config import load_config
@@ -102,6 +102,34 @@ def test_probes_that_disagree_give_no_answer() -> None:
     phase = (stamps % 5 + 2.5) % 5  # after a turning point of the sine
     found = estimate_delay(times, positions, stamps, np.where((phase < 2.5)[:, None], late, tips))
     assert not found.is_known
+
+
+def test_motions_at_once_are_recognised() -> None:
+    assert not _move_at_once(motors(None)[1])
+    assert all(_move_at_once(motors(seed)[1]) for seed in range(3))
+    assert not _move_at_once(np.zeros((10, 3)))
+
+
+@pytest.mark.parametrize(
+    ("difference", "std", "at_once", "is_known"),
+    [
+        (0.08, 0.008, True, False),
+        (0.08, 0.008, False, True),
+        (0.08, 0.02, True, True),
+        (0.2, 0.1, False, False),
+    ],
+)
+def test_probes_that_differ_significantly_where_dofs_move_at_once_give_no_answer(
+    difference: float, std: float, at_once: bool, is_known: bool
+) -> None:
+    model, turning_points = (
+        Probe(delay, delay, std, 0.0, 1e-3, 9, 0.01, (1.0, 1.0, 1.0))
+        for delay in (0.06, 0.06 + difference)
+    )
+    found = _combined(model, turning_points, 60.0, at_once=at_once)
+    assert found.is_known == is_known
+    assert ("one degree of freedom at a time" in found.reason) == (at_once and not is_known)
+    assert (found.model, found.turning_points) == (model, turning_points)
 
 
 def test_a_record_without_a_delay_gives_no_answer() -> None:

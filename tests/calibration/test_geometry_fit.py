@@ -11,6 +11,7 @@ import pytest
 from calibration.records import Case, Instrument
 from simulated_motion import DELAY, actual, simulate, told
 from tautscope.calibration.geometry import GeometryFit, Recording, fit, sweep
+from tautscope.calibration.geometry.checks import shortness
 from tautscope.calibration.geometry.recording import Recorder
 from tautscope.config import Config
 from tautscope.errors import FieldError, MotionHeldError, RecordError, SignalError
@@ -82,6 +83,19 @@ def test_a_measured_distance_sets_the_scale() -> None:
     assert across(found.config, rig) < 0.3e-3
     gain = next(value.after for value in found.values if value.name == "gain insertion")
     assert gain == pytest.approx(np.log(1 / 1.2), abs=0.05)
+
+
+@pytest.mark.parametrize(("duration", "rest"), [(20.0, 0.0), (20.0, 40.0), (60.0, 0.0)])
+def test_a_short_motion_is_reported(duration: float, rest: float) -> None:
+    """Also within a long record."""
+    recording, _ = simulate(duration=duration)
+    time, motors = recording.time, recording.motors
+    extra = duration + np.arange(0.01, rest, 0.01)
+    motors = np.vstack([motors, np.repeat(motors[-1:], len(extra), axis=0)])
+    short = shortness(replace(recording, time=np.append(time, extra), motors=motors))
+    assert ("The motors moved for only 20 s" in short) == (duration < 40)
+    if not rest:
+        assert (short in fit(recording, told()).warnings) == (duration < 40)
 
 
 def relative_scale(config: Config) -> float:

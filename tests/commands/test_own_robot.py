@@ -448,8 +448,11 @@ def test_a_jog_shows_what_the_tip_did(
     ("arguments", "message"),
     [
         (["bend_z", "0.1"], "dof: got 'bend_z', expected one of bend_x, bend_y"),
-        (["bend_x", "1.1"], "distance: got 1.1, expected at most 1 m or rad"),
-        (["bend_y", "0.9"], "distance: got 0.9, expected within range [-0.5, 0.5]"),
+        (["bend_x", "1.1"], "distance: got 1.1, expected at most 1 rad, and not 0"),
+        (
+            ["bend_y", "0.9"],
+            "distance: got 0.9, expected within range [-0.5, 0.5] rad",
+        ),
         (["bend_y", "0.1"], "answer: got 'no'"),
     ],
 )

@@ -325,6 +325,7 @@ def test_a_control_shows_the_state_after_a_refusal(
     clutch = page.get_by_role("checkbox", name="clutch of rotation")
     clutch.click()
     expect(page.locator("#reply")).to_have_text("clutch: refused, late", timeout=TIMEOUT)
+    expect(page.locator("#message")).to_contain_text("clutch: refused, late", timeout=TIMEOUT)
     expect(clutch).to_be_checked(timeout=TIMEOUT)
 
 

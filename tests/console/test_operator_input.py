@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tautscope.config import load_config
 from tautscope.console.lease import COMMAND_AGE, ImageTimes, Lease
-from tautscope.console.messages import Received, Servo
+from tautscope.console.messages import Action, Received, Servo
 from tautscope.console.operator_input import (
     COMMAND_TIMEOUT,
     DEAD_BAND,
@@ -159,7 +159,32 @@ def test_commands_held_back_by_the_network_move_nothing() -> None:
     for k in range(100):  # then all at once
         desk.servo(is_holding=k % 10 != 0, image=image + k, sequence=sequence + k + 1)
         assert not desk.tick().any()
-    assert desk.input.refused["late, or the image displayed is old"] == 100
+    assert desk.input.refused == {"the page shows no recent image": 100}
+
+
+@pytest.mark.parametrize(
+    ("newest", "age", "reason"),
+    [
+        (True, 0.6, "no new image came: for 0.60 s, at most 0.25 s"),
+        (
+            False,
+            0.6,
+            "the page shows an old image, or its commands are late: for 0.60 s, at most 0.25 s",
+        ),
+        (True, 0.2, ""),
+    ],
+)
+def test_a_refusal_says_what_is_late_and_by_how_much(newest: bool, age: float, reason: str) -> None:
+    images = ImageTimes()
+    lease = Lease(images)
+    lease.take(1)
+    shown = images.add(10.0)
+    if not newest:
+        images.add(10.0 + age)
+    command = Action(lease=1, sequence=1, image=shown, name="experiment")
+    assert lease.refusal(1, command, 10.0 + age, needs_image=True) == reason
+    unseen = Action(lease=1, sequence=2, image=0, name="experiment")
+    assert lease.refusal(1, unseen, 10.0, needs_image=True) == "the page shows no recent image"
 
 
 def test_replayed_commands_move_nothing_and_do_not_use_up_sequences() -> None:

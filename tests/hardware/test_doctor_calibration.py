@@ -23,17 +23,17 @@ def checked(
         for kind, age in days.items()
     }
     config = load_config().replace(**changes).calibration
-    found = check_calibration(config, connected, NOW)
+    found = check_calibration(config, connected, "rig.toml", NOW)
     assert all(each.todo for each in found if each.status != "ok")
     return {each.what: (each.status, each.found) for each in found}
 
 
 def test_without_records_nothing_is_calibrated() -> None:
-    found = check_calibration(load_config().calibration, {}, NOW)
+    found = check_calibration(load_config().calibration, {}, "my rig.toml", NOW)
     assert [(each.what, each.status, each.found) for each in found] == [
         (kind, "note", "never calibrated") for kind in KINDS
     ]
-    assert "tautscope calibrate camera" in found[0].todo
+    assert found[0].todo == "tautscope calibrate camera --config 'my rig.toml' --write"
 
 
 def test_fresh_records_of_the_connected_devices_are_ok() -> None:

@@ -46,7 +46,16 @@ def test_a_distance_beyond_the_limit_is_refused(
     rig: str, capsys: pytest.CaptureFixture[str], distance: str
 ) -> None:
     err = failed(capsys, "jog", "--config", rig, "insertion", distance)
-    assert "distance: got" in err
+    assert "expected at most 0.002 m, and not 0" in err
+
+
+def test_the_question_has_a_unit(
+    rig: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for dof, distance, shown in (("insertion", "0.001", "1 mm"), ("rotation", "-0.1", "-0.1 rad")):
+        monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+        assert main(["jog", "--config", rig, dof, distance]) == 2
+        assert f"{dof} will move by {shown} and back" in capsys.readouterr().err
 
 
 def test_nothing_moves_without_a_yes(

@@ -9,7 +9,7 @@ from drawn import BACKLASH
 from recorded import record
 from tautscope.config import Config
 from tautscope.errors import RecordError
-from tautscope.log.reader import Log, Update, read_log
+from tautscope.log.reader import Log, Tick, Update, read_log
 from tautscope.log.replay import estimate_from_log, estimate_from_video, replay_same
 from tautscope.log.writer import LogSummary
 from tautscope.loop.rig import Frame
@@ -95,9 +95,12 @@ def test_a_gap_ends_the_comparison(recorded: Recorded) -> None:
     found, _ = replay_same(log)
     assert found.is_identical
     assert found.ticks + found.updates == 99
-    assert found.ended == f"tick, update or request 100 of {max(log.events)} is not in the log"
+    ticks = [log.events[index] for index in range(1, 100) if isinstance(log.events[index], Tick)]
+    after = f"after the tick at {ticks[-1].sample.time:g} s"
+    missing = f"a tick, update or request is not in the log (entry 100 of {max(log.events)})"
+    assert found.ended == f"{after}, {missing}"
     del log.events[1]
-    with pytest.raises(RecordError, match=r"log: got 'tick, update or request 1 of"):
+    with pytest.raises(RecordError, match=r"log: got 'at the start, a tick, update or request is"):
         replay_same(log)
 
 

@@ -101,7 +101,7 @@ def test_other_arrays_are_refused(pixel_format: str) -> None:
 @pytest.mark.parametrize("pixel_format", ["yuyv", "uyvy", "nv12", "i420"])
 def test_odd_sides_are_refused_where_colour_is_shared(pixel_format: str) -> None:
     with pytest.raises(ConfigError, match=r"^camera\.width: got 33, expected even"):
-        detector(pixel_format, (20, 33))
+        Config().replace(**{"camera.width": 33, "camera.pixel_format": pixel_format})
     if pixel_format in ("nv12", "i420"):
         with pytest.raises(ConfigError, match=r"^camera\.height: got 21, expected even"):
             detector(pixel_format, (21, 32))

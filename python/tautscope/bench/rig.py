@@ -53,10 +53,6 @@ class Bench:
         url = config.camera.source.url
         if not url.startswith("unix:"):
             raise ConfigError("camera.source.url", url, "unix:PATH, on the bench")
-        if config.camera.pixel_format != "bgr":
-            raise ConfigError(
-                "camera.pixel_format", config.camera.pixel_format, "bgr, on the bench"
-            )
         seed = np.random.SeedSequence(config.twin.seed)
         physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
         self._plant = Plant(config, physics)

@@ -40,8 +40,13 @@ from tautscope.loop.kinematics import Floats
 LIMIT = 5.0
 """Largest magnitude of a delay that is searched, unless another is given [s]."""
 AGREEMENT = 0.15
-"""Largest difference of the probes [s]; the model is late by up to 0.12 s where DOFs share their
-friction and move at once."""
+"""Largest difference of the probes [s]."""
+SIGNIFICANT = 3.0
+"""Largest difference where DOFs move at once, over the joint standard deviation: where they share
+their friction, both probes are wrong by more than half of the difference."""
+AT_ONCE, MOVING = 0.2, 0.05
+"""DOFs move at once if several do in so much of the time in which one does; one moves from this
+share of its largest speed on."""
 LARGEST_DRIFT = 0.02
 """[s/s]"""
 LEAST_PARTS = 4
@@ -179,20 +184,30 @@ def estimate_delay(
             return DelayEstimate.unknown(f"{name}: {found}", *results)
         results.append(found)
     model, turning_points = results
-    return _combined(model, turning_points, float(stamps[-1] - stamps[0]))
+    span = float(stamps[-1] - stamps[0])
+    return _combined(model, turning_points, span, at_once=_move_at_once(motors))
 
 
-def _combined(model: Probe, turning_points: Probe, span: float) -> DelayEstimate:
+def _move_at_once(motors: Floats) -> bool:
+    speed = np.abs(np.diff(motors, axis=0))
+    moving = (speed > MOVING * speed.max(axis=0)).sum(axis=1)
+    return bool(np.count_nonzero(moving > 1) > AT_ONCE * np.count_nonzero(moving))
+
+
+def _combined(model: Probe, turning_points: Probe, span: float, *, at_once: bool) -> DelayEstimate:
     difference = abs(model.middle - turning_points.middle)
     apart = difference + span / 2 * max(
         0.0,
         abs(model.drift - turning_points.drift)
         - 3 * math.hypot(model.drift_std, turning_points.drift_std),
     )
-    if apart > AGREEMENT:
+    joint = math.hypot(model.delay_std, turning_points.delay_std)
+    if apart > AGREEMENT or (at_once and difference > SIGNIFICANT * joint):
+        remedy = "; move one degree of freedom at a time, or use `tautscope calibrate geometry`"
         return DelayEstimate.unknown(
             f"the probes disagree by {apart:.2f} s: the model says {model.middle:.3f} s, the "
-            f"turning points {turning_points.middle:.3f} s in the middle of the record",
+            f"turning points {turning_points.middle:.3f} s in the middle of the record"
+            f"{remedy * at_once}",
             model,
             turning_points,
         )

@@ -99,7 +99,9 @@ def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) ->
             break
         try:
             # The answer was the question whether the motors may move.
-            confirmed = argparse.Namespace(**{**vars(options), "yes": True})
+            confirmed = argparse.Namespace(
+                **{**vars(options), "yes": True, "drawn": session.state.drawn}
+            )
             result = step.run(confirmed, session.config, session.folder)
             break
         except TautscopeError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,12 @@ from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_twin, check_rig_options, twin_seed
+from tautscope.commands.calibration_rig import (
+    add_twin,
+    check_rig_options,
+    twin_config,
+    twin_device,
+)
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 from tautscope.runs.output_folder import check_free_file, new_file
@@ -149,9 +155,8 @@ def calibrate(
 def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
     config = arguments.article_config(options.config)
     if options.twin:
-        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
-
-        return twin_images(draw_rig(config, twin_seed(options, config)), board)
+        images = twin_images(twin_config(options, config), board)
+        return replace(images, serial_numbers=twin_device(options, config))
     if options.config is None:
         raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
     return live_images(config, options.seconds)

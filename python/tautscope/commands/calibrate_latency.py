@@ -19,6 +19,7 @@ from tautscope.commands.calibration_rig import (
     confirm_motion,
     refuse_wrong_limits,
     run_protocol,
+    twin_device,
 )
 from tautscope.commands.printing import print_json
 from tautscope.commands.rig_choice import add_rig
@@ -168,8 +169,9 @@ def record(
         changes[f"{dof.label}.free_gain"] = 1.0
         changes[f"experiment.{dof.label}.amplitude"] = SHARE * sine.amplitude
         changes[f"experiment.{dof.label}.period"] = SHARE * sine.period
-    serial_numbers: Mapping[str, str] = {}
-    if not options.twin:
+    if options.twin:
+        serial_numbers = twin_device(options, config)
+    else:
         from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
 
         serial_numbers = read_serial_numbers(config)

@@ -9,12 +9,13 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import progress_bar
 from tautscope.commands.question import confirm
 from tautscope.config import Config
+from tautscope.config.calibration import TWIN
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
@@ -35,7 +36,7 @@ class Setup:
     """A rig, which is closed with the block, its configuration, and its devices.
 
     Attributes:
-        serial_numbers: Of camera and drives, where they have one.
+        serial_numbers: Of camera and drives, where they have one; the seed of the twin.
         executor: For what takes longer than a control period; None for the twin.
     """
 
@@ -88,6 +89,30 @@ def twin_seed(options: argparse.Namespace, config: Config) -> int:
     return int(config.twin.seed if options.seed is None else options.seed)
 
 
+def twin_device(options: argparse.Namespace, config: Config) -> dict[str, str]:
+    """The twin in place of the serial numbers of a rig."""
+    return {TWIN: str(twin_seed(options, config))}
+
+
+def twin_config(
+    options: argparse.Namespace, config: Config, *, camera_is_known: bool = False
+) -> Config:
+    """The configuration of the simulated rig that is calibrated.
+
+    Args:
+        options: Of a calibration; with the values `drawn` once at the start of a sequence.
+        config: The configuration as it is now.
+        camera_is_known: As of `rig_for_calibration`.
+    """
+    from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
+
+    drawn: Mapping[str, Any] | None = getattr(options, "drawn", None)
+    if drawn is not None:
+        return config.replace(**drawn)
+    draw = draw_geometry if camera_is_known else draw_rig
+    return draw(config, twin_seed(options, config))
+
+
 @contextmanager
 def rig_for_calibration(
     options: argparse.Namespace, *, camera_is_known: bool = False
@@ -106,13 +131,11 @@ def rig_for_calibration(
     config = arguments.article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
-        from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
         from tautscope.twin.rig import Twin  # noqa: PLC0415
 
-        draw = draw_geometry if camera_is_known else draw_rig
-        twin = Twin(draw(config, twin_seed(options, config)))
+        twin = Twin(twin_config(options, config, camera_is_known=camera_is_known))
         try:
-            yield Setup(twin, config, {})
+            yield Setup(twin, config, twin_device(options, config))
         finally:
             twin.close()
         return

@@ -13,10 +13,10 @@ import msgspec
 
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands.arguments import article_config
-from tautscope.config import Config, dump_config
+from tautscope.config import Config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
-from tautscope.report.report import document, embedded
+from tautscope.report.report import configuration, document, embedded
 
 
 class SessionState(msgspec.Struct, forbid_unknown_fields=True):
@@ -25,12 +25,14 @@ class SessionState(msgspec.Struct, forbid_unknown_fields=True):
     Attributes:
         folder: Folder of the report.
         seed: Seed of the twin, None on a rig.
+        drawn: Values of the twin, drawn about the configuration before the first step.
         done: Names of the steps done or skipped.
         is_finished: Whether all were done.
     """
 
     folder: str
     seed: int | None = None
+    drawn: dict[str, Any] | None = None
     done: list[str] = msgspec.field(default_factory=list)
     is_finished: bool = False
 
@@ -57,7 +59,7 @@ class CalibrationSession:
         self._state_file = writable_file(file).with_suffix(".calibration.json")
         state = None if restart else _read(self._state_file)
         if state is None or state.is_finished:
-            state = SessionState(str(folder.absolute()), seed)
+            state = SessionState(str(folder.absolute()), seed, self._drawn(seed))
         if state.seed != seed:
             names = [
                 "the rig" if one is None else f"--twin --seed {one}" for one in (state.seed, seed)
@@ -70,6 +72,13 @@ class CalibrationSession:
     def config(self) -> Config:
         """The configuration as it is now."""
         return article_config(self._file)
+
+    def _drawn(self, seed: int | None) -> dict[str, Any] | None:
+        if seed is None:
+            return None
+        from tautscope.twin.drawn_rig import draw_values  # noqa: PLC0415
+
+        return draw_values(self.config, seed)
 
     def finish_step(self, name: str, result: CalibrationResult | None) -> None:
         """Write values, figures and notes of a step, None if it was skipped; note it as done."""
@@ -111,7 +120,7 @@ class CalibrationSession:
                 parts.append(_table(found["values"], found["std"]))
             for file, caption in found["figures"]:
                 parts.append(embedded((self.folder / file).read_bytes(), "png", caption))
-        parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
+        parts.append(configuration(self.config))
         kind = "a simulated rig" if self.state.seed is not None else "the rig"
         return document("Calibration", f"Calibration of {kind} of {self._file}.", "\n".join(parts))
 

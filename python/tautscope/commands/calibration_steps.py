@@ -19,6 +19,7 @@ from tautscope.commands.calibration_rig import run_protocol
 from tautscope.commands.doctor import run_checks
 from tautscope.commands.result_lines import summary_line
 from tautscope.config import Config
+from tautscope.dof import display_text
 from tautscope.errors import CalibrationError
 from tautscope.hardware.doctor.calibration import check_calibration
 from tautscope.report.results import evaluate
@@ -80,9 +81,9 @@ def _latency(options: argparse.Namespace, config: Config, folder: Path) -> Calib
 
 def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
     if options.twin:
-        findings = check_calibration(config.calibration, {})
+        findings = check_calibration(config.calibration, {}, options.config)
     else:
-        findings = list(run_checks(config, is_rig=True, folder=Path.cwd()))
+        findings = list(run_checks(config, options.config, Path.cwd()))
     lines = [f"{each.status}: {each.what}: {each.found}" for each in findings]
     missing = [each for each in findings if each.status == "missing"]
     if missing:
@@ -110,8 +111,8 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
     notes = [summary_line(dof, result) for dof, result in results.items()]
     if options.twin:
         notes += [
-            f"{dof.label}: true slack {dof.display_scale * result.compensated:.3g} "
-            f"{dof.display_unit}"
+            f"{dof.label}: true remaining slack {display_text([result.compensated], [dof])}"
+            f"{', crossed too far' * (result.compensated < 0)}"
             for dof, result in results.items()
         ]
     caption = (

@@ -48,16 +48,17 @@ def add_parser(verbs: arguments.Verbs) -> None:
     arguments.add_json(doctor)
 
 
-def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckResult]:
+def run_checks(config: Config, file: str | None, folder: Path) -> Iterator[CheckResult]:
     """Run all checks.
 
     Args:
         config: Configuration of the rig, or the default.
-        is_rig: Whether to open the configured camera and drives.
+        file: Its file; its camera and drives are opened. None for the default.
         folder: Folder for recordings.
     """
     from tautscope.hardware.doctor import camera, computer, drives  # noqa: PLC0415
 
+    is_rig = file is not None
     yield from computer.check_computer(config)
     yield computer.check_disk(config, folder)
     yield camera.check_devices(needed=not is_rig)
@@ -66,7 +67,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         return
     from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
 
-    if not is_rig:
+    if file is None:
         todo = (
             "tautscope doctor --config rig.toml; start from `tautscope config --config article_rig`"
         )
@@ -74,7 +75,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         return
     yield from camera.check_source(config.camera)
     if config.drives is None:
-        yield from check_calibration(config.calibration, camera_serial_number(config.camera))
+        yield from check_calibration(config.calibration, camera_serial_number(config.camera), file)
         todo = "Add a section [drives] as in `tautscope config --config article_rig`"
         yield CheckResult("drives", "configuration", "missing", "no section [drives]", todo)
         return
@@ -90,7 +91,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         for each in of_drives
         if each.data.get("serial_number")
     }
-    yield from check_calibration(config.calibration, serial_numbers)
+    yield from check_calibration(config.calibration, serial_numbers, file)
 
 
 def _check_own(
@@ -111,7 +112,7 @@ def _check_own(
         if any(each.status == "missing" for each in of_drives):
             return
     kinds = [kind for kind in ("robot", "latency") if getattr(config.calibration, kind) is not None]
-    yield from check_calibration(config.calibration, {}, kinds=kinds)
+    yield from check_calibration(config.calibration, {}, options.config, kinds=kinds)
     rig = make(config)
     try:
         period = f"control_period {1e3 * config.control.period:g} ms, as control.period"
@@ -128,7 +129,7 @@ def _check_own(
 def _doctor(options: argparse.Namespace) -> int:
     if options.rig is None:
         config = arguments.article_config(options.config)
-        checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
+        checks = run_checks(config, options.config, Path.cwd())
     else:
         checks = _check_own(options, *choose_rig(options))
     marked = placeholders(options.config)

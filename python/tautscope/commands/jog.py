@@ -11,7 +11,7 @@ from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import confirm
 from tautscope.commands.rig_choice import add_rig, choose_rig
-from tautscope.dof import Dof
+from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError, FieldError
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _jog(options: argparse.Namespace) -> None:
     check_distance(dof, distance)
     refuse_wrong_limits(options.config)
     before = "After a reset, which may move all motors to their start, " if options.rig else ""
-    question = f"{before}{dof.label} will move by {distance:g} and back."
+    question = f"{before}{dof.label} will move by {display_text([distance], [dof])} and back."
     confirm(question, options, config.camera)
     seen: list[SensorMotion] = []
     if options.rig is not None:

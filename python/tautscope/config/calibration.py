@@ -11,6 +11,8 @@ from tautscope.config.section import Section, require
 
 CALIBRATIONS = ("camera", "colour", "geometry", "latency")
 """The calibrations in the order in which they build on each other."""
+TWIN = "twin"
+"""A simulated rig among the devices of a calibration; its seed is the serial number."""
 
 
 class CalibrationRecord(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -19,7 +21,8 @@ class CalibrationRecord(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     date: str
     """When it was done: ISO 8601 with time zone."""
     serial_numbers: dict[str, str] = field(default_factory=dict)
-    """Serial numbers of the devices that took part: camera, insertion, rotation, bending."""
+    """Serial numbers of the devices that took part: camera, insertion, rotation, bending; or the
+    seed of the twin."""
     std: dict[str, NonNegative] = field(default_factory=dict)
     """Standard deviation of each value, by the dotted path of its key, in the unit of the key."""
     residual: NonNegative | None = None

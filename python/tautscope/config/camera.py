@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from tautscope.config.fields import Position, Positive, Rotation
-from tautscope.config.section import Section
+from tautscope.config.section import Section, require
 
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
 Deinterlace = Literal["bwdif", "always", "none"]
@@ -85,3 +85,10 @@ class CameraConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """k1, k2, p1, p2, k3, k4, k5, k6, as in OpenCV [ours]."""
     source: SourceConfig = field(default_factory=SourceConfig)
     camera_from_guide: PoseConfig = field(default_factory=PoseConfig)
+
+    def _check(self) -> None:
+        """Pixels that share U and V are in pairs."""
+        halved = {"yuyv": 1, "uyvy": 1, "nv12": 2, "i420": 2}.get(self.pixel_format, 0)
+        for name in ("width", "height")[:halved]:
+            side = getattr(self, name)
+            require(side % 2 == 0, name, side, f"even, for {self.pixel_format}")

@@ -61,7 +61,7 @@ class Actions:
             # It waited, at a link that stood or while the rig opened, and must not undo the stop.
             reason = "motion was stopped after it, press Enable again"
         if reason:
-            control.operator.refused[reason] += 1
+            control.operator.count_refusal(reason)
         else:
             reason = self._execute(message)
         if not reason:

@@ -68,7 +68,7 @@ class Lease:
         return True
 
     def refusal(self, client: int, command: Command, now: float, *, needs_image: bool) -> str:
-        """Why a command is refused; empty if it is accepted.
+        """Why a command is refused, before a colon with its figures; empty if it is accepted.
 
         A refused command changes nothing. `needs_image` also refuses a command for which no image
         of the last `COMMAND_AGE` was displayed: one that moves the instrument.
@@ -82,7 +82,17 @@ class Lease:
         if command.sequence <= self._sequences[is_servo]:
             return "repeated or out of order"
         age = self._images.age if needs_image else self._images.outdated
-        if not age(command.image, now) <= COMMAND_AGE:
-            return "late, or the image displayed is old"
-        self._sequences[is_servo] = command.sequence
-        return ""
+        reason = self._lateness(command.image, age(command.image, now))
+        if not reason:
+            self._sequences[is_servo] = command.sequence
+        return reason
+
+    def _lateness(self, image: int, age: float) -> str:
+        if age <= COMMAND_AGE:
+            return ""
+        if age == float("inf"):
+            return "the page shows no recent image"
+        is_newest = image == self._images.newest
+        late = "the page shows an old image, or its commands are late"
+        what = "no new image came" if is_newest else late
+        return f"{what}: for {age:.2f} s, at most {COMMAND_AGE:g} s"

@@ -112,7 +112,7 @@ class OperatorInput:
         reason = self._fault(servo)
         reason = reason or self._lease.refusal(received.client, servo, now, needs_image=moves)
         if reason:
-            self.refused[reason] += 1
+            self.count_refusal(reason)
             return
         # Its age counts from the arrival, also if the control loop reads it late.
         self._accepted_at = min(received.at, now)
@@ -127,6 +127,10 @@ class OperatorInput:
             self._end_program("the operator moves")
             self._axes[:] = np.sign(axes) * beyond / (1 - DEAD_BAND)
             self._point = servo.point
+
+    def count_refusal(self, reason: str) -> None:
+        """Count a refused command, without the figures of its reason."""
+        self.refused[reason.partition(":")[0]] += 1
 
     def start(self, program: Program) -> None:
         """Let a program move the reference from now on."""

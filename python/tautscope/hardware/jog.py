@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config, DrivesConfig
-from tautscope.dof import Dof, Motor, NamedDof
+from tautscope.dof import Dof, Motor, NamedDof, unit
 from tautscope.errors import STOPPED, FieldError, SignalError, TautscopeError
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.signals import exit_on_signals
@@ -33,7 +33,7 @@ def check_distance(dof: NamedDof, distance: float) -> None:
     """
     largest = LARGEST[dof] if isinstance(dof, Dof) else getattr(dof, "width_limit", 0.0)
     if not 0 < abs(distance) <= largest:
-        raise FieldError("distance", distance, f"at most {largest:g} m or rad, and not 0")
+        raise FieldError("distance", distance, f"at most {largest:g} {unit(dof)}, and not 0")
 
 
 def jog(config: DrivesConfig, dof: Motor, distance: float) -> tuple[float, float]:
@@ -106,7 +106,8 @@ def jog_rig(
             raise SignalError("sample.applied", begin.tolist(), allowed)
         low, high = dof.range or (-np.inf, np.inf)
         if not low <= begin[index] + distance <= high:
-            allowed = f"within range {[low, high]}: {dof.name} is at {begin[index]:.4g}"
+            at = f"{dof.name} is at {begin[index]:.4g} {unit(dof)}"
+            allowed = f"within range {[low, high]} {unit(dof)}: {at}"
             raise FieldError("distance", distance, allowed)
         applied: list[float] = []
         measured: dict[int, list[tuple[float, Measurement]]] = {}

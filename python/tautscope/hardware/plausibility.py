@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.dof import Dof
+from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError
 from tautscope.loop.reduction import Report
 
@@ -130,7 +130,8 @@ class PlausibilityMonitor:
         self._ends[dof] = least, largest
         motor, tip = largest[0] - least[0], largest[1] - least[1]
         scale, name = float(self._scale[dof]), f"drives.{dof.label}"
-        moved = f"a tip that moved {tip:.3g} while its motor moved {motor:.3g}"
+        tip_moved, motor_moved = (display_text([each], [dof]) for each in (tip, motor))
+        moved = f"a tip that moved {tip_moved} while its motor moved {motor_moved}"
         if tip < -MAX_REVERSE_MOTION * scale:
             raise ConfigError(
                 f"{name}.sign", moved, "motion in the same direction: the sign is wrong"

@@ -59,17 +59,18 @@ def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]
         RecordError: A message is missing or invalid.
         ConfigError: The configuration has a key that this version does not know.
     """
+    needed = (topics.CONFIG, topics.RUN, topics.VERSIONS)
+    allowed = f"a log of tautscope, with {topics.CONFIG}, {topics.RUN} and {topics.VERSIONS}"
+    if not messages.keys() >= set(needed):
+        found = ", ".join(messages) or "no messages at the start"
+        raise RecordError("log", found, allowed)
     try:
-        texts = {
-            topic: topics.decode(topic, messages[topic]).data
-            for topic in (topics.CONFIG, topics.RUN, topics.VERSIONS)
-        }
+        texts = {topic: topics.decode(topic, messages[topic]).data for topic in needed}
         config = from_document(tomllib.loads(texts[topics.CONFIG]))
         compensated, segments = read_run_facts(texts[topics.RUN], config)
         versions = json.loads(texts[topics.VERSIONS])
     except ConfigError:
         raise
     except (KeyError, TypeError, ValueError) as error:
-        allowed = f"a log of tautscope, with {topics.CONFIG}, {topics.RUN} and {topics.VERSIONS}"
         raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None
     return RunInfo(config, compensated, segments), versions

@@ -80,6 +80,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     comparison, recorder = Comparison(), RunRecorder(log.config)
     clock, codec = log.clock, msg.Codec(log.config)
     prepared: dict[int, tuple[SeenFrame, Callable[[], Detection]]] = {}
+    where = ""
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
@@ -104,11 +105,13 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
             replayed = codec.update(clock, now, seen, report, count)
             comparison.updates += 1
-            where = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
-            comparison.same_updates += _is_same(comparison, event, replayed, where)
+            name = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
+            comparison.same_updates += _is_same(comparison, event, replayed, name)
         else:
-            missing = "image" if event is not None else "tick, update or request"
-            comparison.ended = f"{missing} {index} of {max(log.events)} is not in the log"
+            missing = "an image" if event is not None else "a tick, update or request"
+            after = f"after the {where}" if where else "at the start"
+            entry = f"entry {index} of {max(log.events)}"
+            comparison.ended = f"{after}, {missing} is not in the log ({entry})"
             break
     if not comparison.ticks:
         raise RecordError("log", comparison.ended, _WITH_TICK)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
-from tautscope.errors import ConfigError, FrameError
+from tautscope.errors import FrameError
 
 _CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
 _PLANAR = ("nv12", "i420")
@@ -33,18 +33,11 @@ class FrameLayout:
 
     Attributes:
         shape: Shape of the arrays.
-
-    Raises:
-        ConfigError: A side is odd in a format in which two pixels share U and V.
     """
 
     def __init__(self, camera: CameraConfig) -> None:
         self.pixel_format = camera.pixel_format
         planar = self.pixel_format in _PLANAR
-        if camera.width % 2 and (planar or _CHANNELS[self.pixel_format] == 2):
-            raise ConfigError("camera.width", camera.width, f"even, for {self.pixel_format}")
-        if camera.height % 2 and planar:
-            raise ConfigError("camera.height", camera.height, f"even, for {self.pixel_format}")
         self.shape: tuple[int, ...] = (
             (camera.height * 3 // 2, camera.width)
             if planar

@@ -99,7 +99,15 @@ def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
         f"""{body}
 <h2>Run</h2>
 <dl>{facts_list}</dl>
-<details><summary>Configuration</summary><pre>{escape(dump_config(config))}</pre></details>""",
+{configuration(config)}""",
+    )
+
+
+def configuration(config: Config) -> str:
+    """All values, folded."""
+    return (
+        "<details><summary>Configuration</summary>"
+        f"<pre>{escape(dump_config(config))}</pre></details>"
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import CameraConfig, Config
+from tautscope.twin.camera import check_pixel_format
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class BoardCamera:
 
     def __init__(self, config: Config, texture: NDArray[np.uint8], pixel: float) -> None:
         camera = config.camera
+        check_pixel_format(camera)
         self._shape = camera.height, camera.width
         self._noise = config.twin.image_noise
         self._seed = config.twin.seed

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope._core import Renderer
-from tautscope.config import Config
-from tautscope.errors import FieldError
+from tautscope.config import CameraConfig, Config
+from tautscope.errors import ConfigError, FieldError
 from tautscope.twin.bands import Bands
 from tautscope.twin.disturbances import Disturbances
 from tautscope.twin.sensor import AutomaticExposure, Centreline, compress
@@ -22,6 +22,16 @@ from tautscope.twin.tissue import draw_mucosa, load_backgrounds
 
 FRAMES_PER_BACKGROUND = 25
 """Number of frames after which the next image of the background folder is shown."""
+
+
+def check_pixel_format(camera: CameraConfig) -> None:
+    """Refuse what is not simulated.
+
+    Raises:
+        ConfigError: The images of the camera are not B, G, R.
+    """
+    if camera.pixel_format != "bgr":
+        raise ConfigError("camera.pixel_format", camera.pixel_format, "bgr, for simulated images")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +77,7 @@ class TwinCamera:
 
     def __init__(self, config: Config) -> None:
         camera, instrument, twin = config.camera, config.instrument, config.twin
+        check_pixel_format(camera)
         self._renderer = Renderer(
             size=(camera.width, camera.height),
             focal=(camera.fx, camera.fy),

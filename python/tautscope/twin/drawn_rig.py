@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 
 from tautscope.config import Config
+from tautscope.config.calibration import TWIN
 
 TILT = np.radians(5.0)
 """Largest angle between the configured and the actual guide, about a random axis [rad]."""
@@ -24,20 +27,23 @@ DELAY = 0.2
 _DOMAIN = 18
 
 
-def draw_rig(config: Config, seed: int) -> Config:
-    """The configuration of an actual rig, drawn about the default geometry.
+def draw_values(config: Config, seed: int) -> dict[str, Any]:
+    """The values of an actual rig by which it differs from its configuration.
 
     Focal lengths, principal point, k1, pose of the guide, length of the section and positions of
-    the bands differ uniformly from the defaults, whatever `config` has: the rig stays the same
-    while its configuration is calibrated step by step. Images are stamped late by a drawn delay.
+    the bands differ uniformly from the configured ones, the bands at most by what keeps them apart
+    and on the tip. What was calibrated on the twin of this seed stays, so that the rig does while
+    one calibration after the other is written. Images are stamped late by a drawn delay.
 
     Args:
-        config: All other values are its.
+        config: The configuration before the calibration.
         seed: Of the draw and `twin.seed`; the same seed gives the same rig.
+
+    Returns:
+        Dotted path -> value, as for `Config.replace`.
     """
     random = np.random.default_rng([_DOMAIN, seed])
-    default = Config()
-    camera, instrument = default.camera, default.instrument
+    camera, instrument = config.camera, config.instrument
     pose = camera.camera_from_guide
     axis, direction = (each / np.linalg.norm(each) for each in random.standard_normal((2, 3)))
     turn, _ = cv2.Rodrigues(random.uniform(0, TILT) * axis)
@@ -45,28 +51,36 @@ def draw_rig(config: Config, seed: int) -> Config:
     scale = 1 + random.uniform(-FOCAL_LENGTH, FOCAL_LENGTH)
     k1, *others = camera.distortion
     half = instrument.band_length / 2
-    marker_a = max(instrument.marker_a + random.uniform(-BAND, BAND), half)
-    marker_b = instrument.marker_b + random.uniform(-BAND, BAND)
-    return config.replace(
-        **{
-            "camera.width": camera.width,
-            "camera.height": camera.height,
-            "camera.fx": camera.fx * scale,
-            "camera.fy": camera.fy * scale,
-            "camera.cx": camera.cx + random.uniform(-CENTRE, CENTRE),
-            "camera.cy": camera.cy + random.uniform(-CENTRE, CENTRE),
-            "camera.distortion": (k1 + random.uniform(-DISTORTION, DISTORTION), *others),
-            "camera.camera_from_guide.rotation": cv2.Rodrigues(turn @ nominal)[0].ravel(),
-            "camera.camera_from_guide.translation": pose.translation
-            + random.uniform(0, SHIFT) * direction,
-            "instrument.bending_length": instrument.bending_length
-            * (1 + random.uniform(-SECTION, SECTION)),
-            "instrument.marker_a": marker_a,
-            "instrument.marker_b": min(marker_b, instrument.tip_length - half),
-            "twin.sensor.stamp_error": random.uniform(0, DELAY),
-            "twin.seed": seed,
-        }
-    )
+    band = min(BAND, (instrument.marker_b - instrument.marker_a) / 2 - half)
+    marker_a = max(instrument.marker_a + random.uniform(-band, band), half)
+    marker_b = instrument.marker_b + random.uniform(-band, band)
+    drawn = {
+        "camera.fx": camera.fx * scale,
+        "camera.fy": camera.fy * scale,
+        "camera.cx": camera.cx + random.uniform(-CENTRE, CENTRE),
+        "camera.cy": camera.cy + random.uniform(-CENTRE, CENTRE),
+        "camera.distortion": [k1 + random.uniform(-DISTORTION, DISTORTION), *others],
+        "camera.camera_from_guide.rotation": cv2.Rodrigues(turn @ nominal)[0].ravel().tolist(),
+        "camera.camera_from_guide.translation": (
+            pose.translation + random.uniform(0, SHIFT) * direction
+        ).tolist(),
+        "instrument.bending_length": instrument.bending_length
+        * (1 + random.uniform(-SECTION, SECTION)),
+        "instrument.marker_a": marker_a,
+        "instrument.marker_b": min(marker_b, instrument.tip_length - half),
+        "twin.sensor.stamp_error": random.uniform(0, DELAY),
+        "twin.seed": seed,
+    }
+    for record in (config.calibration.camera, config.calibration.geometry):
+        if record is not None and record.serial_numbers.get(TWIN) == str(seed):
+            for key in record.std:
+                drawn.pop(key.partition("[")[0], None)
+    return drawn
+
+
+def draw_rig(config: Config, seed: int) -> Config:
+    """The configuration with the values of `draw_values`."""
+    return config.replace(**draw_values(config, seed))
 
 
 def draw_geometry(config: Config, seed: int) -> Config:

@@ -21,6 +21,10 @@ LARGEST_SATURATED = 0.25
 """Median share of saturated pixels around the bands."""
 LEAST_TRAVEL = 0.8
 """Travel of each motor, as a share of `safety.width_limit`: less does not cross the slack."""
+LEAST_TIME = 40.0
+"""Time in which motors move, below which a result is less certain than it says [s]."""
+MOVING = 0.05
+"""Share of its largest speed from which on a motor moves."""
 LEAST_SPREAD = 5.0
 """Standard deviation of the features [px]."""
 LARGEST_RESIDUAL = 3.0
@@ -82,6 +86,20 @@ def check_record(recording: Recording, config: Config) -> None:
             f"bands that move by {spread:.2g} px",
             f"at least {LEAST_SPREAD:g} px; is the image frozen, or the instrument not coupled?",
         )
+
+
+def shortness(recording: Recording) -> str:
+    """What a short record makes uncertain; empty if it is long enough."""
+    periods = np.diff(recording.time)
+    speed = np.abs(np.diff(recording.motors, axis=0)) / periods[:, None]
+    is_moving = (speed > MOVING * speed.max(axis=0)).any(axis=1)
+    moved = float(periods[is_moving].sum())
+    if moved >= LEAST_TIME:
+        return ""
+    return (
+        f"The motors moved for only {moved:.0f} s: lengths and focal length may be wrong by far "
+        f"more than their standard deviations say. Move for a minute, {LEAST_TIME:.0f} s at least"
+    )
 
 
 def find_doubts(

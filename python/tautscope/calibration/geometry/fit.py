@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
+from tautscope.calibration.geometry.checks import (
+    LARGEST_RESIDUAL,
+    check_record,
+    find_doubts,
+    shortness,
+)
 from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
@@ -140,6 +145,8 @@ def _result(
 ) -> GeometryFit:
     solution, _ = solutions
     doubts, warnings = find_doubts(model, *solutions, active)
+    if short := shortness(recording):
+        warnings.append(short)
     values = estimated_values(config, model, solution, active)
     changes, stds = changes_and_stds(config, model.configured(solution.z), values)
     delay = next(value for value in values if value.name == "camera.source.delay")

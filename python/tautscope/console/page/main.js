@@ -9,6 +9,7 @@ import { Sound } from "./sound.js";
 import { Steering, isText } from "./steer.js";
 
 const LOST = 500; // ms without a state, or without an image
+const REFUSED = 5000; // ms for which a refusal is shown with the state
 const MODES = { twin: "SIMULATED", hardware: "REAL MOTORS", replay: "RECORDING" };
 const WORDS = {
   ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", unconfirmed: "MAY MOVE", off: "OFF",
@@ -26,6 +27,7 @@ let client = null;
 let receivedAt = -Infinity;
 let motion = "lost";
 let latched = "";
+let refusal = null;
 const sequences = { servo: 0, request: 0 };
 const sound = new Sound($("sound"));
 const token = readToken();
@@ -47,6 +49,7 @@ function request(fields) {
 }
 
 function reply(text, isRefused) {
+  refusal = isRefused ? { text, at: performance.now() } : null;
   $("reply").textContent = text;
   $("reply").classList.toggle("refused", isRefused);
 }
@@ -277,7 +280,8 @@ function update() {
     $("message").textContent = "No data from the control process. What this page moved rests; another page may steer. If in doubt, use the emergency stop.";
     return;
   }
-  $("message").textContent = state.message;
+  const isRefused = refusal && performance.now() - refusal.at < REFUSED;
+  $("message").textContent = [state.message, isRefused && refusal.text].filter(Boolean).join(" — ");
   $("mode").textContent = MODES[state.mode];
   $("mode").dataset.mode = state.mode;
   document.body.dataset.view = hasImage ? "image" : state.positions ? "path" : "none";

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
@@ -18,6 +19,7 @@ _CLOCK_TOLERANCE = 60.0
 def check_calibration(
     config: CalibrationConfig,
     serial_numbers: Mapping[str, str],
+    file: str,
     now: datetime | None = None,
     kinds: Iterable[str] = CALIBRATIONS,
 ) -> list[CheckResult]:
@@ -30,17 +32,23 @@ def check_calibration(
     Args:
         config: Section ``calibration``.
         serial_numbers: Those of the devices that are connected, as far as known.
+        file: The configuration, for the remedies.
         now: Present time.
         kinds: The calibrations, by default all of the article's instrument.
     """
-    return [_check(kind, config, serial_numbers, now or datetime.now(UTC)) for kind in kinds]
+    at = now or datetime.now(UTC)
+    return [_check(kind, config, serial_numbers, shlex.quote(file), at) for kind in kinds]
 
 
 def _check(
-    kind: str, config: CalibrationConfig, serial_numbers: Mapping[str, str], now: datetime
+    kind: str,
+    config: CalibrationConfig,
+    serial_numbers: Mapping[str, str],
+    file: str,
+    now: datetime,
 ) -> CheckResult:
     record: CalibrationRecord | None = getattr(config, kind)
-    todo = f"tautscope calibrate {kind} --config rig.toml --write"
+    todo = f"tautscope calibrate {kind} --config {file} --write"
     if record is None:
         return CheckResult("calibration", kind, "note", "never calibrated", todo)
     age = (now - record.at).total_seconds()
