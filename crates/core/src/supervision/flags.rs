@@ -99,6 +99,14 @@ impl Flags {
     /// The empty set.
     pub const NONE: Self = Self(0);
 
+    /// Faults of one sensor, which others may make up for.
+    pub(crate) const OF_A_SENSOR: Self = Self::of(Flag::Frozen)
+        .union(Self::of(Flag::Late))
+        .union(Self::of(Flag::Duplicate))
+        .union(Self::of(Flag::Clock))
+        .union(Self::of(Flag::Innovation))
+        .union(Self::of(Flag::Lost));
+
     /// The set of one flag.
     pub const fn of(flag: Flag) -> Self {
         Self(1 << flag as u32)

@@ -21,14 +21,6 @@ pub const SENSORS: usize = 4;
 /// Travel of a DOF, in `width_limit`, in which a measurement should have determined it.
 const UNSEEN: f64 = 0.25;
 
-/// Faults of one sensor, which others may make up for.
-const OF_A_SENSOR: Flags = Flags::of(Flag::Frozen)
-    .union(Flags::of(Flag::Late))
-    .union(Flags::of(Flag::Duplicate))
-    .union(Flags::of(Flag::Clock))
-    .union(Flags::of(Flag::Innovation))
-    .union(Flags::of(Flag::Lost));
-
 /// The law of N DOFs, as far as supervision wraps it.
 pub trait Law<const N: usize> {
     /// The command c (N,) [m or rad]; NaN before the first reference.
@@ -276,7 +268,7 @@ impl<const N: usize> Monitors<N> {
 
     /// What a measurement of one of the sensors raised; while others determine every DOF, its faults are worth a warning.
     pub(crate) fn spare(&self, raised: Flags, sensor: usize) -> Flags {
-        let rest = raised.difference(OF_A_SENSOR);
+        let rest = raised.difference(Flags::OF_A_SENSOR);
         if rest == raised || !self.is_determined(self.time, Some(sensor)) {
             return raised;
         }
