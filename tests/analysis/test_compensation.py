@@ -82,6 +82,18 @@ def test_what_the_loop_would_do_does_not_depend_on_the_length_of_the_record() ->
     assert long == pytest.approx(short, rel=0.2)
 
 
+def test_a_record_without_a_time_is_compensated_as_one_with_it() -> None:
+    with_time = simulate("play", 3).record
+    for record in (with_time, replace(with_time, time=None)):
+        verdict = judge(record)
+        loop = verdict.compensation
+        assert loop is not None and loop.after < 0.2 * loop.before
+        played, found = as_played(record, verdict.found)
+        assert found.stroke == pytest.approx(
+            np.ptp(played.clock) / (verdict.found.strokes), rel=0.5
+        )
+
+
 def test_the_loop_is_simulated_on_the_fastest_strokes_of_a_long_record() -> None:
     """At their own speed, also where the record rests for an hour."""
     moving, pause = repeated(4), 3_600.0

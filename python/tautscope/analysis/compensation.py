@@ -134,7 +134,7 @@ def plant(record: Record, found: Identification) -> tuple[PrandtlIshlinskii, flo
 
 
 def as_played(record: Record, found: Identification) -> tuple[Record, Identification]:
-    """A record with a time from 0 to at most `LONGEST`, and its delay in this time.
+    """A record with a time from 0 to at most `LONGEST`, and its delay and strokes in this time.
 
     Of a longer record it is the part whose strokes are the fastest. A loop does worse on a motion
     that is played faster than it is.
@@ -145,7 +145,8 @@ def as_played(record: Record, found: Identification) -> tuple[Record, Identifica
     time = (clock[kept] - clock[kept][0]) / speed
     scale = (1.0 if record.is_timed else UNTIMED) / speed
     delay = Interval(*(scale * each for each in vars(found.delay).values()))
-    return replace(record.part(kept), time=time), replace(found, delay=delay)
+    played = replace(found, delay=delay, stroke=scale * found.stroke)
+    return replace(record.part(kept), time=time), played
 
 
 def _fastest(record: Record, found: Identification) -> slice:
