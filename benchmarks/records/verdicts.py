@@ -48,7 +48,7 @@ JUDGEMENTS = {
     ),
     "continuum pair12 opp, axis 1": ("unknown", "loops of 10 mm, from coupling or slack"),
     "continuum pair12 opp, axis 2": ("unknown", "as axis 1"),
-    "continuum pair13 same, axis 1": ("unknown", "a fan, from the other axis"),
+    "continuum pair13 same, axis 1": ("no slack", "a fan in which the tip leads: the other axis"),
     "continuum pair13 same, axis 2": ("unknown", "two lines, from the other axis"),
     "continuum pair13 opp, axis 1": (
         "unknown",
