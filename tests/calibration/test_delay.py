@@ -105,9 +105,9 @@ def test_probes_that_disagree_give_no_answer() -> None:
 
 
 def test_motions_at_once_are_recognised() -> None:
-    assert not _move_at_once(motors(None)[1])
-    assert all(_move_at_once(motors(seed)[1]) for seed in range(3))
-    assert not _move_at_once(np.zeros((10, 3)))
+    assert not _move_at_once(*motors(None))
+    assert all(_move_at_once(*motors(seed)) for seed in range(3))
+    assert not _move_at_once(np.arange(10.0), np.zeros((10, 3)))
 
 
 @pytest.mark.parametrize(

@@ -371,7 +371,8 @@ def test_two_equal_values_say_as_much_as_one_of_half_the_variance() -> None:
                 stack @ tip, time, np.eye(4) * 2e-4, lambda q: stack @ q, jacobian=lambda _: stack
             )
             np.testing.assert_allclose(first.state_estimate, second.state_estimate, atol=1e-4)
-    np.testing.assert_allclose(once.delta_plus, twice.delta_plus, rtol=3e-3)
+    # The tip is that of the one loop's commands, from which the other one's differ a little.
+    np.testing.assert_allclose(once.delta_plus, twice.delta_plus, rtol=2e-3)
 
 
 def test_what_was_not_measured_is_held() -> None:

@@ -87,12 +87,11 @@ def test_a_sensor_may_fail_where_another_one_measures_the_same(fault: str) -> No
         reference = 0.01 * np.sin(2 * np.pi * sample.time / CYCLE)
         sample = rig.step(loop.step([reference], sample.time))
         for tip in sample.measurement:
-            values, time = np.array(tip.values), tip.captured_at
-            loop.on_tip(values, time)
-            if time > LOST:
-                values, ahead = FAULTS[fault](float(values[0]))
-                time += ahead
-            loop.on_tip([float(np.ravel(values)[0])], time, sensor=1)
+            loop.on_sample(tip)
+            value, ahead = float(np.ravel(tip.values)[0]), 0.0
+            if tip.captured_at > LOST:
+                value, ahead = FAULTS[fault](value)
+            loop.on_tip([value], tip.captured_at + ahead, sensor=1)
         if sample.time > END - CYCLE:
             found.append(sample.true_state[0] - reference)
     assert np.std(found) < 0.1 * np.std(errors(False))
@@ -136,4 +135,4 @@ def test_the_log_says_once_that_ticks_come_at_another_interval(
         loop.on_tip([1e-5 * tick], tick * interval)
     lines = [line for line in caplog.messages if "control.period" in line]
     assert len(lines) == (share != 1.2)
-    assert all(f"ticks every {interval:.4g} s" in line for line in lines)
+    assert all(f"ticks come every {interval:.4g} s" in line for line in lines)

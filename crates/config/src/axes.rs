@@ -142,7 +142,7 @@ impl AxesSettings {
         })
     }
 
-    /// `K_b` of the article's law: so many times slower than `command_speed` is the reference, so that no command is faster.
+    /// `K_b` of the article's law; the reference is followed at `command_speed` over it.
     fn gain(&self, dof: &AxisSettings, compensate: bool) -> f64 {
         match self.profile {
             Profile::Paper if compensate => dof.gain_limit,

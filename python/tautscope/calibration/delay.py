@@ -30,7 +30,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tautscope.calibration.delay_probes import Fit, Signal, fit_model, fit_turning_points
 from tautscope.dof import Dof
@@ -44,9 +44,10 @@ AGREEMENT = 0.15
 SIGNIFICANT = 3.0
 """Largest difference where DOFs move at once, over the joint standard deviation: where they share
 their friction, both probes are wrong by more than half of the difference."""
-AT_ONCE, MOVING = 0.2, 0.05
-"""DOFs move at once if several do in so much of the time in which one does; one moves from this
-share of its largest speed on."""
+AT_ONCE = 0.2
+"""Share of the motion in which several DOFs move, above which they move at once."""
+MOVING = 0.05
+"""Share of its largest speed above which a motor moves."""
 LARGEST_DRIFT = 0.02
 """[s/s]"""
 LEAST_PARTS = 4
@@ -185,13 +186,18 @@ def estimate_delay(
         results.append(found)
     model, turning_points = results
     span = float(stamps[-1] - stamps[0])
-    return _combined(model, turning_points, span, at_once=_move_at_once(motors))
+    return _combined(model, turning_points, span, at_once=_move_at_once(times, motors))
 
 
-def _move_at_once(motors: Floats) -> bool:
-    speed = np.abs(np.diff(motors, axis=0))
-    moving = (speed > MOVING * speed.max(axis=0)).sum(axis=1)
-    return bool(np.count_nonzero(moving > 1) > AT_ONCE * np.count_nonzero(moving))
+def moving(times: Floats, motors: Floats) -> NDArray[np.bool_]:
+    """Which motors (n, m) move from each sample to the next (n - 1, m)."""
+    speed = np.abs(np.diff(motors, axis=0)) / np.diff(times)[:, None]
+    return np.asarray(speed > MOVING * speed.max(axis=0))
+
+
+def _move_at_once(times: Floats, motors: Floats) -> bool:
+    count = moving(times, motors).sum(axis=1)
+    return bool(np.count_nonzero(count > 1) > AT_ONCE * np.count_nonzero(count))
 
 
 def _combined(model: Probe, turning_points: Probe, span: float, *, at_once: bool) -> DelayEstimate:

@@ -41,6 +41,8 @@ LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
 LOGGED_TICKS = 100
 """After so many ticks each the log says, once, why nothing is compensated or ticks are late."""
+OTHER_INTERVAL = math.log(1.4)
+"""Logarithm of the ratio from which on ticks are not at `control.period`; jitter averages out."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -538,10 +540,12 @@ class HysteresisReduction:
         interval = (time - self._logged_at) / LOGGED_TICKS
         self._logged_at = time
         period = self._config.control.period
-        if not self._has_logged_interval and not 0.7 < interval / period < 1.4 and interval > 0:
+        is_other = interval > 0 and abs(math.log(interval / period)) > OTHER_INTERVAL
+        if is_other and not self._has_logged_interval:
             self._has_logged_interval = True
-            what = "the bounds of speed hold for control.period, and late ticks move nothing"
-            _LOG.warning("ticks every %.4g s, control.period = %g s: %s", interval, period, what)
+            what = "control ticks come every %.4g s: set control.period to it. With %g s limits "
+            what += "of speed are wrong by the ratio, and later ticks may move nothing"
+            _LOG.warning(what, interval, period)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:

@@ -54,7 +54,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);
         let rate = self.monitors.check_rate(captured_at, sensor);
-        let raised = self.monitors.spare(raised, sensor);
+        let raised = self.monitors.excuse(raised, sensor);
         self.monitors.update(Source::Frame, raised.union(rate));
         outcome
     }

@@ -266,8 +266,8 @@ impl<const N: usize> Monitors<N> {
         known == [true; N]
     }
 
-    /// What a measurement of one of the sensors raised; while others determine every DOF, its faults are worth a warning.
-    pub(crate) fn spare(&self, raised: Flags, sensor: usize) -> Flags {
+    /// Reduces the flags that a measurement of one of the sensors raised to a warning while others determine every DOF.
+    pub(crate) fn excuse(&self, raised: Flags, sensor: usize) -> Flags {
         let rest = raised.difference(Flags::OF_A_SENSOR);
         if rest == raised || !self.is_determined(self.time, Some(sensor)) {
             return raised;
@@ -288,8 +288,8 @@ impl<const N: usize> Monitors<N> {
         for at in self.last_determined.iter_mut().flatten() {
             *at = at.min(time);
         }
-        let is_spared = !found.is_empty() && self.is_determined(time, None);
-        self.enabled(if is_spared {
+        let is_excused = !found.is_empty() && self.is_determined(time, None);
+        self.enabled(if is_excused {
             Flags::of(Flag::FrameRate)
         } else {
             found

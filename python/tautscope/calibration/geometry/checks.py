@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.delay import moving
 from tautscope.calibration.geometry.model import Model
 from tautscope.calibration.geometry.parameters import IMAGE, PARAMETERS
 from tautscope.calibration.geometry.recording import Recording
@@ -23,8 +24,6 @@ LEAST_TRAVEL = 0.8
 """Travel of each motor, as a share of `safety.width_limit`: less does not cross the slack."""
 LEAST_TIME = 40.0
 """Time in which motors move, below which a result is less certain than it says [s]."""
-MOVING = 0.05
-"""Share of its largest speed from which on a motor moves."""
 LEAST_SPREAD = 5.0
 """Standard deviation of the features [px]."""
 LARGEST_RESIDUAL = 3.0
@@ -90,10 +89,8 @@ def check_record(recording: Recording, config: Config) -> None:
 
 def shortness(recording: Recording) -> str:
     """What a short record makes uncertain; empty if it is long enough."""
-    periods = np.diff(recording.time)
-    speed = np.abs(np.diff(recording.motors, axis=0)) / periods[:, None]
-    is_moving = (speed > MOVING * speed.max(axis=0)).any(axis=1)
-    moved = float(periods[is_moving].sum())
+    is_moving = moving(recording.time, recording.motors).any(axis=1)
+    moved = float(np.diff(recording.time)[is_moving].sum())
     if moved >= LEAST_TIME:
         return ""
     return (
