@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 from tautscope import Config, HysteresisReduction, Report, axes
 from tautscope.config import DofEntry, KinematicsConfig, Sine, from_document
 from tautscope.errors import SignalError
@@ -45,8 +46,12 @@ def operate(
     seconds: float = 50.0,
     delay: float = 0.04,
     amplitude: float = 1.0,
+    spread: bool = False,
 ) -> Floats:
-    """RMS (n,) of tip less reference after 20 s of an operator's motion, looks at 40 Hz."""
+    """RMS (n,) of tip less reference, of the `spread` about its mean, with looks at 40 Hz.
+
+    After 20 s of an operator's motion.
+    """
     count = len(loop.delta_minus)
     motion = OperatorMotion([Sine(centre=0.0, amplitude=amplitude)] * count, 7, seconds)
     late: list[tuple[float, Floats]] = []
@@ -62,7 +67,7 @@ def operate(
             late.pop(0)
         if time > 20:
             errors.append(tip - reference)
-    rms: Floats = np.sqrt(np.mean(np.square(errors), axis=0))
+    rms: Floats = np.sqrt(np.mean(np.square(errors - spread * np.mean(errors, axis=0)), axis=0))
     return rms
 
 
@@ -308,6 +313,34 @@ def test_a_point_that_is_wrong_for_good_is_reported(profile: Literal["best", "pa
             loop.on_points(seen, time)
         assert tick > 2000 or not loop.supervision.latched
     assert {"merged", "innovation"} & set(loop.supervision.latched)
+
+
+@pytest.mark.parametrize("with_orientation", [True, False])
+@pytest.mark.parametrize(
+    ("length", "zero", "tilt"),
+    [(0.06, 0.0, 0.0), (0.06, 5e-3, 0.0), (0.05, 0.0, 0.0), (0.06, 0.0, 0.26)],
+    ids=["right", "zero off by 5 mm", "section shorter", "tilted by 15 degrees"],
+)
+def test_kinematics_and_trackers_may_be_off(
+    length: float, zero: float, tilt: float, with_orientation: bool
+) -> None:
+    """At most a third of the spread is left, and the kinematics are said to be off."""
+    robot = TwoPlanes(TWO.replace(**{"kinematics.length": length}))
+    turn = Rotation.from_rotvec([0.0, tilt, 0.0]).as_matrix()
+    rng = np.random.default_rng(1)
+
+    def look(loop: HysteresisReduction, tip: Floats, at: float) -> None:
+        position, rotation = robot.tip(tip)
+        seen = turn @ position + [zero, 0.0, 0.0] + rng.normal(0, 3e-4, 3)
+        loop.on_pose(seen, at, turn @ rotation if with_orientation else None)
+
+    left = {}
+    for compensate in (False, True):
+        loop = HysteresisReduction(TWO, compensate)
+        left[compensate] = operate(loop, Plays([0.6, 0.6]), look, spread=True)
+    is_right = (length, zero, tilt) == (0.06, 0.0, 0.0)
+    assert np.all(left[True] < (0.1 if is_right else 1 / 3) * left[False]), left
+    assert ("geometry_off" in loop.supervision.latched) == (not is_right)
 
 
 def test_a_model_that_sees_nothing_is_reported() -> None:

@@ -178,7 +178,8 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_LIMIT_CYCLE = 23,
     // The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
-    // The images contradict the configured camera: they are shifted by more than three `image_deviation`.
+    // The images contradict the configured camera: they are shifted by more than three `image_deviation`. Or a sensor contradicts its
+    // model, by three times as much as its covariance says.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,
     // Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     TAUTSCOPE_FLAG_FRAME_RATE = 26,

@@ -343,7 +343,8 @@ pub enum TautscopeFlag {
     LimitCycle = 23,
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = 24,
-    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
+    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`. Or a sensor contradicts its
+    /// model, by three times as much as its covariance says.
     GeometryOff = 25,
     /// Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     FrameRate = 26,

@@ -40,14 +40,14 @@ REMEDIES: dict[str, str] = {
     "swapped": "look in the image which band is which",
     "lost": "bring the bands into the image, or check the sensor",
     "innovation": "look at the image, or check scale and zero of the sensor, and rest for a moment",
-    "merged": "bring both bands into the image, or check the sensor: its zero, its deviation in"
-    " [measurement], or tautscope calibrate robot",
+    "merged": "bring both bands into the image, or check the sensor",
     "unobservable": "bend the section a little",
     "overcompensation": "move slowly until the slack is learned",
     "slack_changed": "move slowly until the slack is learned",
     "tremor": "scale the motion down",
     "reference_fast": "move more slowly",
-    "geometry_off": "run tautscope calibrate geometry",
+    "geometry_off": "run tautscope calibrate geometry, for a sensor tautscope calibrate robot, or"
+    " give its deviation in [measurement]",
     "width_limit": "raise safety.width_limit if the instrument has more slack",
 }
 """What to do about each flag, as a phrase that begins with a verb; the most urgent first."""

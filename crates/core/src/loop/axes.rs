@@ -28,6 +28,8 @@ pub const VALUES: usize = 16;
 const OBSERVABLE: f64 = 0.5;
 /// Limit of the low-passed error of the predicted tip, in units.
 const SLACK_CHANGED: f64 = 0.2;
+/// Gauss-Newton steps to the state that fits a measurement best.
+const FIT_STEPS: usize = 3;
 /// Part of a column that no other explains, over the column, below which it is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -119,6 +121,8 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
     for HysteresisReduction<P, S, (), N>
 {
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport {
+        let mut covariance = [0.0; VALUES * VALUES];
+        let reading = &self.weighed(reading, &mut covariance);
         self.check_start(reading);
         let identity = identity(reading.values);
         let outcome = self.update_by(reading, reading.captured_at, reading.sensor, identity);
@@ -176,6 +180,24 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
         });
         if let Some(measured) = found {
             self.monitors.check_start(past.command, measured);
+        }
+    }
+}
+
+impl<P, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> HysteresisReduction<P, S, (), N> {
+    /// A reading with the covariance that its sensor has shown to have.
+    fn weighed<'a>(&mut self, reading: &Reading<'a>, covariance: &'a mut [f64]) -> Reading<'a> {
+        let past = self.history.at(reading.captured_at);
+        let misfit = past.and_then(|past| reading.misfit(past.predicted_state));
+        let scale = self.monitors.fit(misfit, reading.sensor);
+        let Some(covariance) = covariance.get_mut(..reading.covariance.len()) else {
+            return *reading;
+        };
+        let told = covariance.iter_mut().zip(reading.covariance);
+        told.for_each(|(to, told)| *to = scale * told);
+        Reading {
+            covariance,
+            ..*reading
         }
     }
 }
@@ -318,6 +340,33 @@ impl Reading<'_> {
     fn is_consistent(&self) -> bool {
         let count = self.values.len();
         count <= VALUES && self.covariance.len() == count * count && self.sensor < SENSORS
+    }
+
+    /// Mean squared misfit, in told standard deviations, of the values that no state near a given one (N,) explains; None
+    /// where a state explains all.
+    fn misfit<const N: usize>(&self, mut state: [f64; N]) -> Option<f64> {
+        if !self.is_consistent() {
+            return None;
+        }
+        let observed = self.observed();
+        let seen = self.values.iter().filter(|value| value.is_finite());
+        let seen = seen.count();
+        let mut misfit = None;
+        for _ in 0..FIT_STEPS {
+            let rows = observed.linearize(self, &Prior::at(state), observed.seen, &[0.0; N])?;
+            let fitted = compressed(rows);
+            let known = fitted.by_state.diagonal().map(|entry| entry != 0.0);
+            let spare = seen.checked_sub(known.iter().filter(|known| **known).count());
+            let spare = spare.filter(|spare| *spare > 0)?;
+            let at = SVector::from(state);
+            let whole = (rows.value - rows.by_state * at).norm_squared();
+            let explained = (fitted.value - fitted.by_state * at).norm_squared();
+            #[expect(clippy::cast_precision_loss, reason = "a small number")]
+            let mean = (whole - explained).max(0.0) / spare as f64;
+            misfit = Some(mean);
+            (state, _) = least_squares(&fitted, state, known.into())?;
+        }
+        misfit.filter(|misfit| misfit.is_finite())
     }
 
     fn is_partial(&self) -> bool {

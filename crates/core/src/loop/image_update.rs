@@ -55,7 +55,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);
         let rate = self.monitors.check_rate(captured_at, sensor);
         let raised = self.monitors.excuse(raised, sensor);
-        self.monitors.update(Source::Frame, raised.union(rate));
+        let fit = self.monitors.check_fit(sensor);
+        let raised = raised.union(rate).union(fit);
+        self.monitors.update(Source::Frame, raised);
         outcome
     }
 

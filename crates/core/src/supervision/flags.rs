@@ -85,7 +85,8 @@ flags! {
     LimitCycle = "limit_cycle",
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = "slack_changed",
-    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`.
+    /// The images contradict the configured camera: they are shifted by more than three `image_deviation`. Or a sensor contradicts its
+    /// model, by three times as much as its covariance says.
     GeometryOff = "geometry_off",
     /// Images or measurements come at another rate than before, or from one sensor less: a clock or a sensor is not as before.
     FrameRate = "frame_rate",

@@ -12,6 +12,7 @@ use crate::supervision::frame_rate::FrameRate;
 use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
 use crate::supervision::reference_gate::ReferenceGate;
+use crate::supervision::sensor_fit::SensorFit;
 use crate::supervision::settings::SafetySettings;
 use crate::supervision::start_check::StartCheck;
 use crate::supervision::supervisor::{Event, Supervision, Supervisor};
@@ -49,6 +50,7 @@ pub struct Monitors<const N: usize> {
     /// A gate for each sensor.
     frames: [FrameGate<N>; SENSORS],
     rates: [FrameRate; SENSORS],
+    fits: [SensorFit; SENSORS],
     motion: MotionMonitor<N>,
     start: StartCheck<N>,
     supervisor: Supervisor<N>,
@@ -92,6 +94,7 @@ impl<const N: usize> Monitors<N> {
             limiters,
             frames: [FrameGate::new(safety, dofs)?; SENSORS],
             rates: [FrameRate::NEW; SENSORS],
+            fits: [SensorFit::NEW; SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,
             start: StartCheck::new(dofs.map(|dof| dof.start_deviation)),
             supervisor: Supervisor::new(safety)?,
@@ -233,6 +236,23 @@ impl<const N: usize> Monitors<N> {
         let rate = self.rates.get_mut(sensor);
         let is_other = rate.is_some_and(|rate| rate.update(captured_at));
         self.enabled(Flags::when(is_other, Flag::FrameRate))
+    }
+
+    /// The variance of one of the sensors over the told one, with the misfit of a measurement of it, if it has any.
+    pub(crate) fn fit(&mut self, misfit: Option<f64>, sensor: usize) -> f64 {
+        let Some(fit) = self.fits.get_mut(sensor) else {
+            return 1.0;
+        };
+        if let Some(misfit) = misfit {
+            fit.update(misfit);
+        }
+        fit.scale()
+    }
+
+    /// Check whether one of the sensors agrees with its model.
+    pub(crate) fn check_fit(&self, sensor: usize) -> Flags {
+        let is_off = self.fits.get(sensor).is_some_and(SensorFit::is_off);
+        self.enabled(Flags::when(is_off, Flag::GeometryOff))
     }
 
     /// Check the Mahalanobis distance of an innovation.
