@@ -233,7 +233,7 @@ def notes(error: BaseException) -> list[str]:
 
 def described(error: BaseException) -> str:
     """An error with its `notes`."""
-    return "; ".join([str(error), *notes(error)])
+    return "; ".join(filter(None, [str(error), *notes(error)]))
 
 
 def may_move(error: BaseException) -> bool:

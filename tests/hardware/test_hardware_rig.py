@@ -33,6 +33,7 @@ from tautscope.hardware.experiment import _apply_reaction, run_on_hardware
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing, read_sent
+from tautscope.log.reader import read_log
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Rig
 from tautscope.loop.safety import Reaction
@@ -75,6 +76,22 @@ def test_move_to_start_respects_the_start_speed(
     assert (fastest <= 0.5 * np.array(limits) * (1 + 1e-9)).all()
     assert (fastest / limits).max() > 0.2  # but does not take for ever
     assert sample.time == 0.0
+
+
+def test_a_stop_while_the_drives_are_opened_leaves_them_off(
+    setup: Callable[..., Setup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, enabled = setup(), list[str]()
+    monkeypatch.setattr(FakeMotors, "start", lambda motors: enabled.append("on"))
+
+    def open_and_stop() -> FakeMotors:
+        one.rig.interrupt()
+        return one.motors
+
+    one.rig._open_motors = open_and_stop  # type: ignore[method-assign]
+    with pytest.raises(StateError, match="after the stop"):
+        one.rig.reset()
+    assert not enabled
 
 
 def test_a_second_ctrl_c_does_not_hide_a_stop_that_is_not_confirmed(
@@ -307,6 +324,8 @@ def test_supervisor_reaction_reaches_the_drives_in_the_same_tick(
         run_on_hardware(config, tmp_path / "run", lambda share: None, make_rig=lambda _: one.rig)
     assert (one.motors.stopped, one.motors.disabled, one.camera.closed) == (1, disabled, 1)
     assert next(ticks) == 21  # no further tick
+    told = read_log(tmp_path / "run" / "compensated.mcap").warnings
+    assert len([one for one in told if "DriveError: loop: " in one]) == 1
 
 
 def test_held_motion_ends_the_run_and_stops_the_motors(

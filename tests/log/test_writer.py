@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from drawn import DrawnRig
 from tautscope.config import Config
-from tautscope.errors import FieldError, OutputError, RecordError
+from tautscope.errors import EMERGENCY_STOP, FieldError, OutputError, RecordError
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import HysteresisReduction
@@ -167,8 +167,11 @@ def test_logged_arrays_may_be_reused(tmp_path: Path, config: Config) -> None:
 def test_a_failed_run_leaves_its_log_and_the_error(tmp_path: Path, config: Config) -> None:
     with pytest.raises(ZeroDivisionError), LogWriter(tmp_path / "run.mcap", config) as log:
         log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
-        raise ZeroDivisionError("the rig fell over")
+        error = ZeroDivisionError("the rig fell over")
+        error.add_note(EMERGENCY_STOP)
+        raise error
     read = read_log(tmp_path / "run.mcap")
     assert not read.damage
     assert len(read.events) == 1
-    assert any("ZeroDivisionError: the rig fell over" in warning for warning in read.warnings)
+    told = f"the run ended with ZeroDivisionError: the rig fell over; {EMERGENCY_STOP}"
+    assert any(told in warning for warning in read.warnings)

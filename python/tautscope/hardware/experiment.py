@@ -105,7 +105,6 @@ def _run(
                 monitor=partial(PlausibilityMonitor, config),
             )
         except BaseException as error:
-            log.warn(f"{type(error).__name__}: {error}")
             if log.has_begun and isinstance(error, TautscopeError):
                 error.exit_status = STOPPED
             raise

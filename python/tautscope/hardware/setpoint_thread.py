@@ -133,8 +133,9 @@ class SetpointThread:
         failure: BaseException | None = None
         try:
             with realtime(SETPOINTS) as self._timing.realtime, self._motors() as motors:
-                self._move_to_start(motors, motors.start())
-                self._stream(motors)
+                if not self._must_stop():  # a stop while they were opened leaves them off
+                    self._move_to_start(motors, motors.start())
+                    self._stream(motors)
                 if self._is_disabling:
                     motors.disable()
                     self._is_disabled = True

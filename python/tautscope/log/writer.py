@@ -21,7 +21,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
-from tautscope.errors import FieldError
+from tautscope.errors import FieldError, described
 from tautscope.log import messages as msg
 from tautscope.log.header import RunInfo
 from tautscope.log.journal import POLL_PERIOD, Journal
@@ -227,7 +227,7 @@ class LogWriter:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is not None:
-            self.warn(f"the run ended with {type(error).__name__}: {error}")
+            self.warn(f"the run ended with {type(error).__name__}: {described(error)}")
         self.close()
 
     def _enqueue(self, now: float, arguments: tuple[Any, ...]) -> bool:
