@@ -218,6 +218,27 @@ def test_a_stop_that_was_not_confirmed_is_repeated(tmp_path: Path) -> None:
 
 
 @FAMILIES
+def test_a_packet_that_the_port_does_not_take_in_time_is_lost_and_the_stop_repeats_it(
+    protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, packets = ServoLine.write_all, list[Register]()
+
+    def write_some(line: ServoLine, values: dict[int, int], register: Register) -> None:
+        packets.append(register)
+        if len(packets) in (1, 3, 5):
+            raise NoAnswerError("Operation timed out")
+        write(line, values, register)
+
+    with running(servos_config(protocol, tmp_path)) as (servos, drives):
+        drive(drives, 3)
+        monkeypatch.setattr(ServoLine, "write_all", write_some)
+        drive(drives, 2)
+        drives.stop()
+        assert goals_are_positions(servos)
+        assert len(packets) >= 4
+
+
+@FAMILIES
 def test_fault_persists_until_it_is_reset(protocol: str, tmp_path: Path) -> None:
     config = servos_config(protocol, tmp_path)
     with SimulatedServos(config, start=START) as servos:

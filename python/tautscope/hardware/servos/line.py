@@ -123,6 +123,7 @@ class ServoLine:
         """Write to several servos with one packet (sync write), which none answers.
 
         Raises:
+            NoAnswerError: The port did not take the packet in time.
             BusError: The port is lost.
         """
         data = [list(register.encode(value)) for value in values.values()]

@@ -106,7 +106,8 @@ class ServoDrives(DriveGroup):
         """
         self._check_pause(f"servos on {self._config.channel}")
         self._goals = targets
-        self._line.write_all(dict(zip(self._ids, targets, strict=True)), self._family.goal)
+        with suppress(NoAnswerError):  # lost like a set-point on its way; `_receive` counts silence
+            self._line.write_all(dict(zip(self._ids, targets, strict=True)), self._family.goal)
         self._receive()
         return self._feedback
 
@@ -137,10 +138,11 @@ class ServoDrives(DriveGroup):
         try:
             self._line.set_timeout(self._config.reply_timeout)
             while pending and time.monotonic() < deadline:
-                # Goals are read-only once the watchdog has tripped.
-                if self._family.watchdog is not None:
-                    self._line.write_all(dict.fromkeys(self._ids, 0), self._family.watchdog)
-                self._line.write_all(dict(zip(self._ids, values, strict=True)), register)
+                with suppress(NoAnswerError):  # the next round repeats it
+                    # Goals are read-only once the watchdog has tripped.
+                    if self._family.watchdog is not None:
+                        self._line.write_all(dict.fromkeys(self._ids, 0), self._family.watchdog)
+                    self._line.write_all(dict(zip(self._ids, values, strict=True)), register)
                 for dof in sorted(pending):
                     try:
                         value, _ = self._line.read(self._ids[dof], register)
