@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from servo_settings import servos_config
 from tautscope.config import DrivesConfig, load_config
 from tautscope.errors import SecondMasterError
 from tautscope.hardware import drives as drives_module
@@ -54,6 +55,14 @@ def test_other_users_can_lock_it_later_whatever_the_umask(bus: DrivesConfig) -> 
             assert lock_path(bus).stat().st_mode & 0o777 == 0o644
     finally:
         os.umask(mask)
+
+
+def test_two_names_of_a_port_are_one_bus(tmp_path: Path) -> None:
+    (tmp_path / "by-id").symlink_to(tmp_path / "port")
+    both = [
+        servos_config("feetech", tmp_path, channel=str(tmp_path / x)) for x in ("port", "by-id")
+    ]
+    assert lock_path(both[0]) == lock_path(both[1])
 
 
 def test_another_bus_is_free(bus: DrivesConfig) -> None:

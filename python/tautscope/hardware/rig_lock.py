@@ -60,7 +60,9 @@ class RigLock:
 
 def lock_path(config: DrivesConfig) -> Path:
     """The file that is locked; it has no content and stays."""
-    bus = f"{config.protocol} {config.interface} {config.channel}"
+    channel = Path(config.channel)  # of a port also a link to it, as in /dev/serial/by-id
+    channel = channel.resolve() if channel.is_absolute() else channel
+    bus = f"{config.protocol} {config.interface} {channel}"
     name = hashlib.sha256(bus.encode()).hexdigest()[:16]
     return Path(tempfile.gettempdir()) / f"tautscope-{name}.lock"
 
