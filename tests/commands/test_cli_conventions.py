@@ -386,3 +386,11 @@ def test_extras_install_the_modules_that_are_checked() -> None:
         for module, names in known.items():
             own = module == "distributed" and "dask" in wanted
             assert own or names & wanted, (extra, module)
+
+
+def test_without_an_input_nothing_moves(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", None)  # closed by the caller
+    assert main(["jog", "insertion", "0.001", "--config", "bench"]) == 2
+    assert "nothing moved" in capsys.readouterr().err

@@ -21,7 +21,7 @@ def ask(question: str, camera: CameraConfig) -> str:
     """
     print(question, end="", file=sys.stderr, flush=True)
     if not camera.source.url.startswith("pipe:"):
-        return sys.stdin.readline().lower()
+        return sys.stdin.readline().lower() if sys.stdin else ""  # None if it was closed
     try:
         with TERMINAL.open(encoding="utf-8") as terminal:
             return terminal.readline().lower()
