@@ -164,6 +164,14 @@ def test_consumer_heartbeat_encodes_node_and_time() -> None:
         assert bus.sent == [written]
 
 
+def test_a_bus_that_takes_no_frame_is_waited_for_within_the_cycle() -> None:
+    with open_transcript({}) as (fieldbus, bus):
+        waits: list[float | None] = []
+        bus.send = lambda msg, timeout=None: waits.append(timeout)  # type: ignore[method-assign]
+        fieldbus.send(0x080, b"")
+        assert waits == [fieldbus._config.reply_timeout]
+
+
 def test_emergency_object_raises() -> None:
     """S300: 081 10 43 08 01 is the motor temperature; 081 00 00 resets it."""
     with open_transcript({}) as (fieldbus, bus):

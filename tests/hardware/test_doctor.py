@@ -229,7 +229,7 @@ def test_wrong_drive_is_named_and_the_others_are_checked(
 
 @pytest.mark.parametrize(
     ("state", "todo"),
-    [(State.FAULT, "Find the cause"), (State.OPERATION_ENABLED, "end the program")],
+    [(State.FAULT, "look error code 0x7305 up"), (State.OPERATION_ENABLED, "end the program")],
 )
 def test_nothing_is_written_to_an_enabled_or_faulty_drive(
     hub: Hub, bench: Bench, state: State, todo: str
@@ -237,6 +237,7 @@ def test_nothing_is_written_to_an_enabled_or_faulty_drive(
     config = drives_of(document(hub.path))
     drives = bench(config)
     set_state(drives, Dof.ROTATION, state)
+    drives._drives[Dof.ROTATION].values[0x603F, 0] = 0x7305
     before = [dict(drive.values) for drive in drives._drives]
     found = missing(check_drives(config))
     assert found.keys() == {"rotation, node 2"}

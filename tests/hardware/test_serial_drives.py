@@ -32,8 +32,9 @@ from tautscope.errors import (
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.serial_line import frames
-from tautscope.hardware.serial_line.frames import State
+from tautscope.hardware.serial_line.frames import Refusal, Request, State
 from tautscope.hardware.serial_line.line import open_port
+from tautscope.hardware.serial_line.serial_drives import SerialDrives
 from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
@@ -129,6 +130,38 @@ def test_host_that_hangs_is_stopped_by_the_watchdog(tmp_path: Path) -> None:
         with pytest.raises(StateError, match=r"no set-point for .*heartbeat_timeout"):
             drive(drives, 1)
         assert board.board.state == State.STOPPED
+
+
+def test_motors_that_a_killed_host_left_enabled_are_stopped_before_they_are_enabled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config, asked = serial_config(tmp_path, heartbeat_timeout=5.0), list[Request]()
+    ask = SerialDrives._ask
+
+    def record(drives: SerialDrives, kind: Request, *rest: Any, **named: Any) -> frames.Status:
+        asked.append(kind)
+        return ask(drives, kind, *rest, **named)
+
+    monkeypatch.setattr(SerialDrives, "_ask", record)
+    with SimulatedMicrocontroller(config, start=START) as board:
+        killed = SerialDrives(config, open_port(config))
+        killed.enable(reset_faults=False)
+        killed.close()  # without a stop
+        assert board.board.state == State.ENABLED
+        asked.clear()
+        with open_drives(config) as drives:
+            drives.start()
+            assert asked[-3:] == [Request.READ, Request.STOP, Request.ENABLE]
+
+
+def test_a_refused_enable_is_told_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "tautscope.bench.serial_board.SerialBoard._enable", lambda *_: Refusal.STATE
+    )
+    config = serial_config(tmp_path)
+    told = pytest.raises(StateError, match="stays disabled, and refuses with reason 3, state")
+    with SimulatedMicrocontroller(config, start=START), open_drives(config) as drives, told:
+        drives.start()
 
 
 def test_unplugged_port_is_a_bus_error(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ import can
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import BusError, EmergencyError, HeartbeatError, SecondMasterError, StateError
-from tautscope.hardware.drive_group import Feedback
+from tautscope.hardware.drive_group import RESET, Feedback
 from tautscope.hardware.fieldbus import TX_PDO
 
 NMT, SYNC, EMERGENCY = 0x000, 0x080, 0x080
@@ -129,7 +129,8 @@ class CanopenMaster(ABC):
         """Send a frame."""
         message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         try:
-            self._bus.send(message)
+            # Without a timeout, SocketCAN fails at a full queue and a serial adapter may hang.
+            self._bus.send(message, self._config.reply_timeout)
         except (can.CanError, OSError, ValueError) as error:
             raise bus_lost(error) from error
 
@@ -206,7 +207,7 @@ class CanopenMaster(ABC):
                     node.name,
                     f"emergency 0x{int.from_bytes(data[:2], 'little'):04X}, error register "
                     f"0x{data[2]:02X}, manufacturer's data {data[3:].hex()}",
-                    "Look the code up in the drive's manual; start again with reset_faults",
+                    f"Look the code up in the drive's manual, then {RESET}",
                 )
         if not self.is_monitoring:
             return

@@ -15,7 +15,13 @@ from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
 from tautscope.hardware.cia402_errors import ignores_setpoints, state_error, transition_error
 from tautscope.hardware.commissioning import commission
-from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup, DriveStatus, Feedback
+from tautscope.hardware.drive_group import (
+    RESET,
+    CommissionedDrive,
+    DriveGroup,
+    DriveStatus,
+    Feedback,
+)
 from tautscope.hardware.fieldbus import Fieldbus
 
 MODES = {
@@ -76,9 +82,8 @@ class Cia402Drives(DriveGroup):
         modes = [number for number in MODES if supported >> (number - 1) & 1]
         problem = ""
         if state in (State.FAULT, State.FAULT_REACTION):
-            problem = (
-                "Find the cause: look its error code (0x603F) up in the manual, then power-cycle it"
-            )
+            code = self._bus.read_or_zero(dof, objects.ERROR_CODE)
+            problem = f"Find the cause: look error code 0x{code:04X} up in its manual, then {RESET}"
         elif state is State.OPERATION_ENABLED:
             problem = "It is enabled: end the program that commands it, or power-cycle it"
         elif not {7, 8} & set(modes) and "6502" not in self._config.waive:

@@ -6,7 +6,7 @@ from tautscope.config.drives import waiver_hint
 from tautscope.errors import DriveError, ModeRefusedError, SilentDriveError, StateError
 from tautscope.hardware import cia402
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.drive_group import Feedback
+from tautscope.hardware.drive_group import RESET, Feedback
 
 
 def mode_refused(name: str, mode: Mode, shown: int) -> ModeRefusedError:
@@ -51,7 +51,7 @@ def state_error(
     shown = "a state unknown to CiA 402" if state is None else state.value
     remedy = "Check its supply, its enable input and its limit switches"
     if state in (State.FAULT, State.FAULT_REACTION):
-        remedy = "Look its error code (0x603F) up in the manual, then start with reset_faults"
+        remedy = f"Look its error code up in the manual (tautscope doctor shows it), then {RESET}"
     elif not feedback.statusword & cia402.REMOTE:
         remedy = (
             "Its statusword says that it is not commanded from the bus (bit 9): end its maker's "

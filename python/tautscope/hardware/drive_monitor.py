@@ -170,8 +170,8 @@ class DriveMonitor:
                 name,
                 f"following error: position {position:.6g}, recent commands "
                 f"{following.lower[dof]:.6g} to {following.upper[dof]:.6g}{note}",
-                f"Check whether something blocks the motor, then {dof.key}"
-                ".counts_per_unit, following_error, following_window and drives.lag",
+                "Check whether something blocks the motor or it turns against its encoder, then "
+                f"{dof.key}.counts_per_unit, following_error, following_window and drives.lag",
             )
         jump = abs(position - last)
         elapsed = (age + 2) * self._config.cycle

@@ -29,7 +29,7 @@ from tautscope.extras import require_extras
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.drive_group import Feedback
+from tautscope.hardware.drive_group import RESET, Feedback
 from tautscope.hardware.fieldbus import (
     TX_PDO,
     TX_PDO_OBJECTS,
@@ -149,7 +149,7 @@ class EthercatFieldbus(Fieldbus):
                 raise EmergencyError(
                     slave.name,
                     f"it went to {state}, error code {code}",
-                    "Look the code up in the drive's manual; start again with reset_faults",
+                    f"Look the code up in the drive's manual, then {RESET}",
                 )
             slave.is_enabled = state is State.OPERATION_ENABLED
         return feedback

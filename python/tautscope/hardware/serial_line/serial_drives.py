@@ -22,6 +22,7 @@ from tautscope.errors import (
     StateError,
 )
 from tautscope.hardware.drive_group import (
+    RESET,
     CommissionedDrive,
     DriveGroup,
     DriveStatus,
@@ -37,7 +38,7 @@ _START = 4.0
 """How long a microcontroller may take to start after its port was opened [s]."""
 _REPEAT = 0.1
 """After which time without an answer a request is repeated [s]."""
-_FAULT = "Find the cause, then start with reset_faults"
+_FAULT = f"Find the cause, then {RESET}"
 
 
 class SerialDrives(DriveGroup):
@@ -75,7 +76,7 @@ class SerialDrives(DriveGroup):
         """
         limits, at = self._limits(dof), self._config[dof].node - 1
         status = self._ask(Request.READ)
-        fault, state = status.faults[at], _name(State, status.state)
+        fault, state = status.faults[at], _state(status.state)
         found = f"{state}; {_fault_name(fault) if fault else 'no fault'}; {limits.lower} to "
         found += f"{limits.upper} counts; up to {limits.speed} counts/s"
         problem = _FAULT if fault or status.state == State.FAULT else ""
@@ -128,11 +129,14 @@ class SerialDrives(DriveGroup):
         if status.state == State.FAULT:
             raise StateError(self._name, "a fault has stopped it", _FAULT)
         self._was_enabled = self._is_moving = True
+        if status.state == State.ENABLED:
+            # Left by a killed host: it may still move, with that host's watchdog time.
+            status = self._ask(Request.STOP)
         watchdog = struct.pack("<H", round(1e3 * self._config.heartbeat_timeout))
         status = self._ask(Request.ENABLE, watchdog)
         if status.state != State.ENABLED:
             self._check_faults(status, StateError)
-            what = f"it stays {_name(State, status.state)}: {_name(Refusal, status.refusal)}"
+            what = f"it stays {_state(status.state)}{_why(status.refusal)}"
             raise StateError(self._name, what, "Check its program; power-cycle it")
         self._targets = list(status.positions)
         targets = [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
@@ -243,12 +247,12 @@ class SerialDrives(DriveGroup):
         if status.state != State.ENABLED:
             raise StateError(
                 self._name,
-                f"it is {_name(State, status.state)}",
+                f"it is {_state(status.state)}",
                 "If it restarted, it has forgotten its positions: check its supply, and "
                 "drives.*.home",
             )
         if status.refusal:
-            what = f"it refused a request: {_name(Refusal, status.refusal)}"
+            what = f"it does not carry out set-points{_why(status.refusal)}"
             raise StateError(self._name, what, "Check its program")
 
     def _check_faults(self, status: frames.Status, error: type[DriveError]) -> None:
@@ -263,6 +267,13 @@ def _fault_name(number: int) -> str:
     return f"{FAULTS.get(number, 'of its own')} ({number})"
 
 
-def _name(kind: type[State] | type[Refusal], number: int) -> str:
-    known = number in [one.value for one in kind]
-    return kind(number).name.lower() if known else f"{kind.__name__.lower()} {number}"
+def _why(refusal: int) -> str:
+    """Why a request was refused; empty if it was not."""
+    if not refusal:
+        return ""
+    name = Refusal(refusal).name.lower() if refusal in list(Refusal) else "of its own"
+    return f", and refuses with reason {refusal}, {name} (docs/serial.md)"
+
+
+def _state(number: int) -> str:
+    return State(number).name.lower() if number in list(State) else f"in state {number}"

@@ -11,17 +11,14 @@ from tautscope.config import DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN, MODELS
 from tautscope.dof import Motor
 from tautscope.errors import ModeRefusedError, SettingRefusedError, SilentDriveError, StateError
-from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
+from tautscope.hardware.drive_group import RESET, CommissionedDrive, DriveStatus
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.servos.families import FAMILIES, Register, Setting
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
 
 T = TypeVar("T")
 _LOG = logging.getLogger(__name__)
-_REMEDY = (
-    "Find the cause (load, supply, temperature; docs/hardware.md), then power-cycle it or start "
-    "with reset_faults"
-)
+_REMEDY = f"Find the cause (load, supply, temperature; docs/hardware.md), then {RESET}"
 
 
 class Servo:
