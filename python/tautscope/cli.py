@@ -30,7 +30,8 @@ from tautscope.commands import (
 from tautscope.errors import USAGE, TautscopeError, notes
 from tautscope.extras import require_extras
 
-INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
+SIGNALLED = 128
+INTERRUPTED, CLOSED_PIPE = SIGNALLED + 2, SIGNALLED + 13
 """Exit status after SIGINT and SIGPIPE, as of a shell."""
 _STATUS = """exit status:
   0    success
@@ -77,6 +78,10 @@ def _main(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt as stop:
         print("\n".join(["interrupted", *notes(stop)]), file=sys.stderr)
         return INTERRUPTED
+    except SystemExit as stop:
+        if isinstance(stop.code, int) and stop.code > SIGNALLED:
+            print("\n".join(["terminated", *notes(stop)]), file=sys.stderr)
+        raise
     except OSError as error:
         if error.filename is None:
             raise

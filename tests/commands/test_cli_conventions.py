@@ -218,6 +218,28 @@ def test_an_interruption_says_what_was_written(
     assert capsys.readouterr().err == "interrupted\nThe log of the run is run.mcap\n"
 
 
+@pytest.mark.parametrize("command", ["config", "run"])
+def test_a_termination_says_that_motors_may_still_move(
+    command: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        error = SystemExit(143)
+        error.add_note(EMERGENCY_STOP)
+        raise error
+
+    monkeypatch.setattr("tautscope.commands.config.load_config", stop)
+    monkeypatch.setattr("tautscope.hardware.experiment.run_on_hardware", stop)
+    options = ["--config", "bench", "--yes", "--out", str(tmp_path / "run")]
+    try:
+        status = main([command, *(options if command == "run" else [])])
+    except SystemExit as end:
+        status = end.code
+    assert status == 143
+    err = capsys.readouterr().err
+    assert err.endswith(f"{EMERGENCY_STOP}\n")
+    assert "are stopped" not in err
+
+
 def test_an_error_that_replaces_an_unconfirmed_stop_tells_it(
     capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
