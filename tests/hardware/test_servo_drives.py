@@ -218,6 +218,17 @@ def test_a_stop_that_was_not_confirmed_is_repeated(tmp_path: Path) -> None:
 
 
 @FAMILIES
+def test_a_servo_that_restarted_is_told_to_be_without_torque(protocol: str, tmp_path: Path) -> None:
+    with running(servos_config(protocol, tmp_path)) as (servos, drives):
+        drive(drives, 3)
+        servos.inject("restart", Dof.ROTATION)
+        with pytest.raises(FollowingError) as found:
+            drive(drives, 10_000)
+        (note,) = [one for one in found.value.__notes__ if "torque" in one]
+        assert note.startswith("rotation, servo 2: without torque. If it restarted")
+
+
+@FAMILIES
 def test_a_packet_that_the_port_does_not_take_in_time_is_lost_and_the_stop_repeats_it(
     protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -180,6 +180,10 @@ class DriveGroup(ABC):
         self._is_unconfirmed = bool(unconfirmed)
         return unconfirmed
 
+    def remark(self) -> str:
+        """What a bus knows of an error after its stop, for people; empty if nothing."""
+        return ""
+
     @abstractmethod
     def close(self) -> None:
         """Release the bus; a second call does nothing."""

@@ -27,6 +27,7 @@ from tautscope.errors import (
     EMERGENCY_STOP,
     STOPPED,
     DriveError,
+    FollowingError,
     SignalError,
     StateError,
     described,
@@ -278,6 +279,8 @@ class Drives:
                 _require_confirmed(self._quick_stop())
             except StateError as failed:
                 error.add_note(str(failed))
+            if isinstance(error, FollowingError) and (note := self._group.remark()):
+                error.add_note(note)
         if note := self._monitor.pause_note:
             error.add_note(note)
 

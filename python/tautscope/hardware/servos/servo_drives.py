@@ -127,6 +127,22 @@ class ServoDrives(DriveGroup):
         self._await_rest(self.probe)
         return self._command_until(self._family.torque, [0] * len(self._servos))
 
+    def remark(self) -> str:
+        """Which servos have no torque: a restarted one shows by its following error only."""
+        if not self._was_enabled or self._config.after_quick_stop == "release":
+            return ""
+        names = []
+        for servo in self._servos:
+            with suppress(DriveError, NoAnswerError):
+                if not self._line.read(servo.id, self._family.torque)[0]:
+                    names.append(servo.name)
+        if not names:
+            return ""
+        return (
+            f"{'; '.join(names)}: without torque. If it restarted, it has forgotten its turns: "
+            "check its supply, and where it is (tautscope doctor)"
+        )
+
     def close(self) -> None:
         """Release the port; a second call does nothing."""
         self._line.close()
