@@ -64,3 +64,9 @@ def test_every_statusword_of_the_standard() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_controlword_of_the_standard(command: int) -> None:
     assert command in words(COMMANDS[command])
+
+
+def test_error_codes_have_their_class_in_words() -> None:
+    told = [cia402.error_text(code) for code in (0x4310, 0x2310, 0x8611, 0x8250, 0x0001)]
+    assert told[:2] == ["0x4310 (temperature)", "0x2310 (current)"]
+    assert told[2:] == ["0x8611 (following error or positioning)", "0x8250 (monitoring)", "0x0001"]

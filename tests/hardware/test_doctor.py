@@ -229,7 +229,10 @@ def test_wrong_drive_is_named_and_the_others_are_checked(
 
 @pytest.mark.parametrize(
     ("state", "todo"),
-    [(State.FAULT, "look error code 0x7305 up"), (State.OPERATION_ENABLED, "end the program")],
+    [
+        (State.FAULT, "look error code 0x7305 (additional modules, such as sensor or brake) up"),
+        (State.OPERATION_ENABLED, "end the program"),
+    ],
 )
 def test_nothing_is_written_to_an_enabled_or_faulty_drive(
     hub: Hub, bench: Bench, state: State, todo: str

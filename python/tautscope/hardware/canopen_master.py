@@ -25,6 +25,7 @@ import can
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import BusError, EmergencyError, HeartbeatError, SecondMasterError, StateError
+from tautscope.hardware.cia402 import error_text
 from tautscope.hardware.drive_group import RESET, Feedback
 from tautscope.hardware.fieldbus import TX_PDO
 
@@ -205,7 +206,7 @@ class CanopenMaster(ABC):
                 data, node.emergency = node.emergency, b""
                 raise EmergencyError(
                     node.name,
-                    f"emergency 0x{int.from_bytes(data[:2], 'little'):04X}, error register "
+                    f"emergency {error_text(int.from_bytes(data[:2], 'little'))}, error register "
                     f"0x{data[2]:02X}, manufacturer's data {data[3:].hex()}",
                     f"Look the code up in the drive's manual, then {RESET}",
                 )

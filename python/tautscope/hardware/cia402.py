@@ -96,3 +96,28 @@ def next_controlword(state: State | None) -> int | None:
     None in a fault, and while the drive makes a transition by itself.
     """
     return _NEXT.get(state) if state is not None else None
+
+
+_ERRORS = {
+    0x1: "generic error",
+    0x2: "current",
+    0x3: "voltage",
+    0x4: "temperature",
+    0x5: "hardware of the drive",
+    0x6: "software of the drive",
+    0x7: "additional modules, such as sensor or brake",
+    0x8: "monitoring",
+    0x81: "communication",
+    0x84: "speed controller",
+    0x85: "position controller",
+    0x86: "following error or positioning",
+    0x9: "external error",
+    0xF: "additional functions of its maker",
+}
+"""Classes of error codes by their first digits, as in CiA 301 and CiA 402."""
+
+
+def error_text(code: int) -> str:
+    """An error code (0x603F, or of an emergency object) with its class."""
+    meaning = _ERRORS.get(code >> 8) or _ERRORS.get(code >> 12)
+    return f"0x{code:04X}" + (f" ({meaning})" if meaning else "")

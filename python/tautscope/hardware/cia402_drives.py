@@ -82,8 +82,8 @@ class Cia402Drives(DriveGroup):
         modes = [number for number in MODES if supported >> (number - 1) & 1]
         problem = ""
         if state in (State.FAULT, State.FAULT_REACTION):
-            code = self._bus.read_or_zero(dof, objects.ERROR_CODE)
-            problem = f"Find the cause: look error code 0x{code:04X} up in its manual, then {RESET}"
+            code = cia402.error_text(self._bus.read_or_zero(dof, objects.ERROR_CODE))
+            problem = f"Find the cause: look error code {code} up in its manual, then {RESET}"
         elif state is State.OPERATION_ENABLED:
             problem = "It is enabled: end the program that commands it, or power-cycle it"
         elif not {7, 8} & set(modes) and "6502" not in self._config.waive:

@@ -143,7 +143,7 @@ class EthercatFieldbus(Fieldbus):
                 # The mailbox may take most of a second, in which the others would move on.
                 self.broadcast(cia402.QUICK_STOP, targets)
                 try:
-                    code = f"0x{self.read(dof, objects.ERROR_CODE):04X}"
+                    code = cia402.error_text(self.read(dof, objects.ERROR_CODE))
                 except DriveError:
                     code = "not read: its mailbox does not answer"
                 raise EmergencyError(
