@@ -326,6 +326,7 @@ def test_supervisor_reaction_reaches_the_drives_in_the_same_tick(
     assert next(ticks) == 21  # no further tick
     told = read_log(tmp_path / "run" / "compensated.mcap").warnings
     assert len([one for one in told if "DriveError: loop: " in one]) == 1
+    assert "The log of the run" not in str(told)
 
 
 def test_held_motion_ends_the_run_and_stops_the_motors(

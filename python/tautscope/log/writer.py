@@ -40,18 +40,18 @@ def run_log(path: Path, config: Config, **options: Any) -> Iterator[LogWriter]:
     A run that fails before its first tick leaves neither log nor folder; a later error gets a note
     that names the log.
     """
-    with LogWriter(path, config, **options) as log:
-        try:
+    log = LogWriter(path, config, **options)
+    try:
+        with log:
             yield log
-        except BaseException as error:
-            if log.has_begun:
-                error.add_note(f"The log of the run is {path}: `tautscope report {path}`")
-            else:  # nothing to keep: the same folder can be used again
-                log.close()
-                path.unlink()
-                with suppress(OSError):
-                    path.parent.rmdir()
-            raise
+    except BaseException as error:
+        if log.has_begun:
+            error.add_note(f"The log of the run is {path}: `tautscope report {path}`")
+        else:  # nothing to keep: the same folder can be used again
+            path.unlink()
+            with suppress(OSError):
+                path.parent.rmdir()
+        raise
 
 
 @dataclass(frozen=True, slots=True)
