@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import logging
 import os
@@ -29,10 +30,14 @@ from tautscope.commands import (
 )
 from tautscope.errors import USAGE, TautscopeError, notes
 from tautscope.extras import require_extras
+from tautscope.hardware.signals import TERMINATING, exit_on_termination
 
-SIGNALLED = 128
-INTERRUPTED, CLOSED_PIPE = SIGNALLED + 2, SIGNALLED + 13
+INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
 """Exit status after SIGINT and SIGPIPE, as of a shell."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of writing, which have no name of a file."""
+TERMINATED = tuple(128 + number for number in TERMINATING)
+"""After SIGTERM and SIGHUP."""
 _STATUS = """exit status:
   0    success
   1    the result is negative: replay differs, align has no answer, something is missing or no use
@@ -45,15 +50,23 @@ _STATUS = """exit status:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status, see ``tautscope --help``."""
+    # A closed stream is None, to which nothing can be printed.
+    sys.stdout, sys.stderr = (each or io.StringIO() for each in (sys.stdout, sys.stderr))
     try:
         try:
             return _main(arguments)
         finally:
             sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
+        is_closed = isinstance(error, BrokenPipeError)
+        if not is_closed and error.errno not in _FULL:
+            raise
         # The interpreter flushes again when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
+        if is_closed:
+            return CLOSED_PIPE
+        print(f"error: the output cannot be written: {error.strerror}", file=sys.stderr)
+        return USAGE
 
 
 def _main(arguments: Sequence[str] | None) -> int:
@@ -69,7 +82,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     try:
         options.stdout = sys.stdout
         people = io.StringIO() if getattr(options, "json", False) else sys.stdout
-        with _logging(options.verbose), redirect_stdout(people):
+        with _logging(options.verbose), redirect_stdout(people), exit_on_termination():
             require_extras(f"tautscope {options.verb}", options.extras)
             return options.run(options) or 0
     except TautscopeError as error:
@@ -79,9 +92,10 @@ def _main(arguments: Sequence[str] | None) -> int:
         print("\n".join(["interrupted", *notes(stop)]), file=sys.stderr)
         return INTERRUPTED
     except SystemExit as stop:
-        if isinstance(stop.code, int) and stop.code > SIGNALLED:
-            print("\n".join(["terminated", *notes(stop)]), file=sys.stderr)
-        raise
+        if not isinstance(stop.code, int) or stop.code not in TERMINATED:
+            raise  # argparse has printed why
+        print("\n".join(["terminated", *notes(stop)]), file=sys.stderr)
+        return stop.code
     except OSError as error:
         if error.filename is None:
             raise

@@ -8,6 +8,7 @@ import logging
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
@@ -34,6 +35,7 @@ from tautscope.errors import (
     StateError,
 )
 from tautscope.extras import MODULES, require_extras
+from tautscope.runs.output_folder import new_folder
 
 Capture = pytest.CaptureFixture[str]
 COMMAND = [sys.executable, "-W", "error", "-m", "tautscope"]
@@ -162,6 +164,42 @@ def test_a_closed_pipe_is_no_traceback(arguments: list[str]) -> None:
         os.close(writer)
     assert found.stderr == ""
     assert found.returncode == 141
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device")
+@pytest.mark.parametrize("arguments", [["config"], ["config", "--json"]])
+def test_a_full_disk_of_the_output_is_one_line(arguments: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        found = subprocess.run(
+            [*COMMAND, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert found.stderr == "error: the output cannot be written: No space left on device\n"
+    assert found.returncode == 2
+
+
+def test_a_closed_output_is_no_traceback() -> None:
+    shell = ["sh", "-c", '"$@" >&-', "sh", *COMMAND, "config"]
+    found = subprocess.run(shell, capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stderr) == (0, "")
+    shell[2] = '"$@" 2>&-'
+    found = subprocess.run(
+        [*shell, "--config", "nope"], capture_output=True, text=True, check=False
+    )
+    assert (found.returncode, found.stdout) == (2, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_terminated_command_leaves_no_partial_output(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int
+) -> None:
+    def stop(*_: object) -> None:
+        with new_folder(tmp_path / "out"):
+            os.kill(os.getpid(), number)
+
+    monkeypatch.setattr("tautscope.commands.config.load_config", stop)
+    assert main(["config"]) == 128 + number
+    assert capsys.readouterr().err == "terminated\n"
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_missing_file_is_named(capsys: Capture) -> None:

@@ -33,6 +33,17 @@ def test_signal_leaves_every_with(number: int) -> None:
     assert found.value.code == 128 + number
 
 
+def test_nohup_keeps_a_process_that_is_not_terminated() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with pytest.raises(SystemExit) as found, exit_on_signals():
+            os.kill(os.getpid(), signal.SIGHUP)
+            os.kill(os.getpid(), signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert found.value.code == 128 + signal.SIGTERM
+
+
 def test_sigint_ignored_by_the_shell_is_restored() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

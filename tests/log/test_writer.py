@@ -175,3 +175,14 @@ def test_a_failed_run_leaves_its_log_and_the_error(tmp_path: Path, config: Confi
     assert len(read.events) == 1
     told = f"the run ended with ZeroDivisionError: the rig fell over; {EMERGENCY_STOP}"
     assert any(told in warning for warning in read.warnings)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"), [(KeyboardInterrupt, "interrupted"), (SystemExit, "terminated")]
+)
+def test_a_run_that_is_ended_by_a_signal_says_so_in_words(
+    kind: type[BaseException], text: str, tmp_path: Path, config: Config
+) -> None:
+    with pytest.raises(kind), LogWriter(tmp_path / "run.mcap", config):
+        raise kind
+    assert read_log(tmp_path / "run.mcap").warnings == (f"the run was {text}",)

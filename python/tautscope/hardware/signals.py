@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 
@@ -23,12 +23,22 @@ def exit_on_signals() -> Iterator[None]:
     raises KeyboardInterrupt, also in a background process whose shell ignores it. The handlers are
     restored at the end. Outside the main thread this does nothing.
     """
+    with exit_on_termination(), _installed({signal.SIGINT: signal.default_int_handler}):
+        yield
+
+
+@contextmanager
+def exit_on_termination() -> Iterator[None]:
+    """As `exit_on_signals`, for a process without motors: SIGINT is left as it is.
+
+    SIGHUP stays ignored where it is: nohup asks for that.
+    """
 
     def exit_process(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
-    handlers: dict[int, Handler] = dict.fromkeys(TERMINATING, exit_process)
-    with _installed(handlers | {signal.SIGINT: signal.default_int_handler}):
+    numbers = [each for each in TERMINATING if signal.getsignal(each) is not signal.SIG_IGN]
+    with _installed(dict.fromkeys(numbers, exit_process)):
         yield
 
 
@@ -48,7 +58,7 @@ def defer_signals() -> Iterator[None]:
 
 
 @contextmanager
-def _installed(handlers: dict[int, Handler]) -> Iterator[None]:
+def _installed(handlers: Mapping[int, Handler]) -> Iterator[None]:
     """Install signal handlers for the block, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -21,7 +21,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
-from tautscope.errors import FieldError, described
+from tautscope.errors import FieldError, notes
 from tautscope.log import messages as msg
 from tautscope.log.header import RunInfo
 from tautscope.log.journal import POLL_PERIOD, Journal
@@ -31,6 +31,11 @@ from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
 
 _LOG = logging.getLogger(__name__)
+_ENDS = {
+    KeyboardInterrupt: "the run was interrupted",
+    SystemExit: "the run was terminated",
+}
+"""How a run ended, by the exception's type."""
 
 
 @contextmanager
@@ -227,7 +232,8 @@ class LogWriter:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is not None:
-            self.warn(f"the run ended with {type(error).__name__}: {described(error)}")
+            ended = f"the run ended with {type(error).__name__}: {error}"
+            self.warn("; ".join([_ENDS.get(type(error), ended), *notes(error)]))
         self.close()
 
     def _enqueue(self, now: float, arguments: tuple[Any, ...]) -> bool:
