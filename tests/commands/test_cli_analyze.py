@@ -180,6 +180,32 @@ def test_columns_are_listed_and_pairs_proposed(
     assert f"analyze {record} --command motor --measured tip" in capsys.readouterr().out
 
 
+def test_a_column_that_is_not_listed_is_named_with_its_first_bad_cell(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text("motor,tip,state\n" + 9 * "1,2,\n" + "2,inf,\n")
+    bad = f"{file}, line 11, column tip: got 'inf', expected a number"
+    assert main(["analyze", str(file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [each["title"] for each in found["columns"]] == ["motor"]
+    assert found["left_out"][0].startswith(bad)
+    assert found["left_out"][1] == f"{file}, column state: got 'no value', expected numbers"
+    assert main(["analyze", str(file)]) == 0
+    assert f"Left out: {bad}" in capsys.readouterr().out
+
+
+def test_a_table_without_a_column_of_numbers_says_why(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text("motor,tip\n" + 9 * "1,2\n" + "motor,tip\n1,2\n")  # two records, one file
+    assert main(["analyze", str(file)]) == 2
+    assert f"{file}, line 11, column motor: got 'motor'" in capsys.readouterr().err
+    file.write_text("motor,tip\n")
+    assert "no column of numbers: no data" in failed(capsys, "analyze", str(file))
+
+
 @pytest.mark.usefixtures("undrawn", "three_models")
 def test_a_tip_of_its_own_file_and_rate(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Motor at 100 Hz, tip at 27 Hz that begins later, in ns since 1970."""

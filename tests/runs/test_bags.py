@@ -187,7 +187,7 @@ def test_columns_of_a_bag_are_listed_and_pairs_proposed(tmp_path: Path) -> None:
             for t, m in zip(TIMES[::3], MOTOR[::3], strict=True)
         ],
     }
-    columns, pairs = list_columns(open_table(write_bag(tmp_path / "bag", "db3", topics)))
+    columns, pairs, _ = list_columns(open_table(write_bag(tmp_path / "bag", "db3", topics)))
     found = {column.title: column for column in columns}
     assert found["/tip/pose/position/x"].count == len(TIMES[::3])
     assert found["/joint_states/m/position"].largest == MOTOR.max()

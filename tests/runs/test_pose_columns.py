@@ -71,7 +71,7 @@ def test_tables_with_poses_have_turn_and_travel(ending: str, tmp_path: Path) -> 
     np.testing.assert_allclose(found.columns["q_turn"], angles, atol=1e-9)
     np.testing.assert_allclose(found.columns["tip_travel"], 5 * angles, atol=1e-9)
     assert found.units == {"q_turn": "rad"}
-    _, pairs = list_columns(open_table(file))
+    _, pairs, _ = list_columns(open_table(file))
     assert pairs[0][0] == "motor"
     assert not {("tip_x", "tip_travel"), ("tip_travel", "tip_x")} & set(pairs)
 

@@ -281,6 +281,15 @@ def test_numbers_that_could_mean_two_things_are_refused(tmp_path: Path) -> None:
         read_record(file, "a", "b")
 
 
+def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("time,motor,tip\n0,02,1,50,-2,25\n0,04,1,60,-2,35\n")
+    with pytest.raises(RecordError, match="6 whole numbers in a line below 3 titles"):
+        read_record(file, "motor", "tip")
+    file.write_text("time,motor,tip,a,b,c\n0,02,1,50,-2,25\n0,04,1,60,-2,35\n")
+    assert read_record(file, "motor", "tip").command.tolist() == [2, 4]
+
+
 @pytest.mark.parametrize(
     "text",
     ["time,motor,tip\n", f"time,motor,tip\n0,1,{200_000 * '3'}\n1,2,3\n", 200_000 * "x"],

@@ -112,11 +112,11 @@ def _run(options: argparse.Namespace) -> int:
         needed = "--command and --measured: without them the columns are listed"
         arguments.refuse_unused(options, needed, *of_columns, "out", "config")
         _, sheet = _open(options)
-        columns, pairs = list_columns(sheet)
+        columns, pairs, left_out = list_columns(sheet)
         proposed = [{"command": command, "measured": tip} for command, tip in pairs]
         document = {"columns": [asdict(column) for column in columns], "pairs": proposed}
-        print_json(options, document)
-        print_columns(options.file, columns, pairs)
+        print_json(options, document | {"left_out": [str(error) for error in left_out]})
+        print_columns(options.file, columns, pairs, left_out)
         return 0
     for name in ("command", "measured"):
         if getattr(options, name) is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands.printing import console, print_table
+from tautscope.errors import RecordError
 from tautscope.runs.columns import Column
 
 if TYPE_CHECKING:
@@ -14,8 +15,13 @@ if TYPE_CHECKING:
     from tautscope.analysis.verdict import Verdict
 
 
-def print_columns(file: str, columns: Sequence[Column], pairs: Sequence[tuple[str, str]]) -> None:
-    """Print the columns with their ranges, and commands to continue with."""
+def print_columns(
+    file: str,
+    columns: Sequence[Column],
+    pairs: Sequence[tuple[str, str]],
+    left_out: Sequence[RecordError],
+) -> None:
+    """Print the columns with their ranges, those left out, and commands to continue with."""
     import shlex  # noqa: PLC0415
 
     rows = [
@@ -31,6 +37,8 @@ def print_columns(file: str, columns: Sequence[Column], pairs: Sequence[tuple[st
     ]
     print_table(("number", "title", "unit", "values", "least", "largest"), rows, left=(1, 2))
     screen = console()
+    for error in left_out:
+        screen.print(f"Left out: {error}", soft_wrap=True)
     print("\nType one of these:" if pairs else "\nNo two columns move together.")
     for command, tip in pairs:
         words = ["tautscope", "analyze", file, "--command", command, "--measured", tip]

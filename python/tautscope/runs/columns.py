@@ -57,8 +57,12 @@ def time_column(titles: list[str]) -> str | None:
     return None
 
 
-def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
-    """Columns of numbers, and pairs of command and tip, the most likely first.
+def list_columns(
+    sheet: Sheet,
+) -> tuple[list[Column], list[tuple[str, str]], list[RecordError]]:
+    """Columns of numbers, pairs of command and tip, and why other columns are left out.
+
+    The most likely pair is the first.
 
     A pair is proposed if its values are correlated; names such as motor and tip come first. Which
     of two is the command follows from their names, else from which of them lags.
@@ -66,15 +70,17 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
     Raises:
         RecordError: No column has numbers.
     """
-    columns, moving = [], {}
+    columns, moving, left_out = [], {}, []
     time = time_column(sheet.titles)
     for index, title in enumerate(sheet.titles):
         try:
             values, _ = sheet.values(index, title)
-        except RecordError:
+        except RecordError as error:
+            left_out.append(error)
             continue
         seen = values[np.isfinite(values)]
         if not len(seen):
+            left_out.append(RecordError(f"{sheet.file}, column {title}", "no value", "numbers"))
             continue
         is_alone = sheet.titles.count(title) == 1
         name = title if is_alone else str(index + 1)
@@ -84,9 +90,13 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
         is_counter = np.all(np.diff(seen) > 0)
         if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
             moving[name] = filled(values)[:: -(-len(values) // _ENOUGH)]
-    if not columns and len(sheet.rows):
-        begin = f"no column of numbers: the data begin at {sheet.line} {sheet.rows[0]}"
-        raise RecordError(sheet.file, begin, "numbers below a line of titles")
+    if not columns:
+        begin = f"the data begin at {sheet.line} {sheet.rows[0]}" if len(sheet.rows) else "no data"
+        got = f"no column of numbers: {begin}"
+        refused = RecordError(sheet.file, got, "numbers below a line of titles")
+        for each in left_out if len(sheet.rows) else ():
+            refused.add_note(str(each))
+        raise refused
     own = _components(sheet.titles)
     pairs = [
         (strength, *_ordered(one, other, moving))
@@ -95,7 +105,7 @@ def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
         if (strength := _strength(one, other, moving)) > LEAST_CORRELATION
     ]
     pairs.sort(key=lambda pair: -pair[0])
-    return columns, [(command, tip) for _, command, tip in pairs[:MOST_PAIRS]]
+    return columns, [(command, tip) for _, command, tip in pairs[:MOST_PAIRS]], left_out
 
 
 def _components(titles: list[str]) -> set[tuple[str, str]]:

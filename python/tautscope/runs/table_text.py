@@ -25,6 +25,7 @@ _DELIMITERS = ("\t", ";", ",", "|", " ")
 _VALUE = re.compile(
     r"[+-]?(\d+([.,]\d*)*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf|\d+[-/.:]\d+[-/.:]\d+.*", re.IGNORECASE
 )
+_INTEGER = re.compile(r"[+-]?\d+")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +82,8 @@ def split_table(data: bytes, file: str) -> TableText:
     cells = [_cells(line, delimiter) for line in head]
     width = _usual_width(cells)
     begin = _first_data(cells, width)
+    if delimiter == "," and begin < len(cells):
+        _check_decimal_commas(cells[:begin], cells[begin:], file)
     titles, groups, units, used = _titles(cells[:begin], width)
     if not titles:
         marked = [_cells(_MARK.sub("", line.decode()), delimiter) for line in comments]
@@ -103,6 +106,17 @@ def split_table(data: bytes, file: str) -> TableText:
         body,
         numbers.astype(np.int64) + 1 + above,
     )
+
+
+def _check_decimal_commas(above: list[list[str]], data: list[list[str]], file: str) -> None:
+    """Refuse 0,5,1,5 below two titles: decimal commas between commas."""
+    count = len(above[-1]) if above else 0
+    if count > 1 and all(
+        len(line) == 2 * count and all(map(_INTEGER.fullmatch, line)) for line in data
+    ):
+        found = f"{2 * count} whole numbers in a line below {count} titles"
+        allowed = "a delimiter that is not the decimal comma, such as a semicolon"
+        raise RecordError(file, found, allowed)
 
 
 def _titles(above: list[list[str]], width: int) -> tuple[list[str], list[str], list[str], int]:
