@@ -37,6 +37,7 @@ th:first-child, td:first-child { text-align: left; padding-left: 0; }
 .meanings td:nth-child(3) { min-width: 6.5rem; }
 details { margin: 1rem 0; } summary { cursor: pointer; font-weight: 600; }
 thead th { border-bottom: 1.5px solid #222; font-weight: 600; }
+.figures :is(th, td:first-child) { white-space: normal; }
 thead tr:first-child:not(:last-child) th { border-bottom: 0; text-align: center; }
 tbody tr + tr td { border-top: 1px solid #e4e4e4; }
 .first { padding-left: 2rem; color: #777; }
@@ -48,9 +49,11 @@ dl { display: grid; grid-template-columns: max-content auto; gap: .1rem 1.5rem; 
 dt { color: #555; } dd { margin: 0; }
 @media (max-width: 45rem) { body { padding: 0 1rem; } .first { padding-left: .5rem; }
   td:first-child { white-space: normal; }
+  figure { overflow-x: auto; } figure img { min-width: 40rem; }
+  figcaption { position: sticky; left: 0; max-width: calc(100vw - 2rem); }
   .meanings :is(th, td):nth-child(n) { min-width: 0; white-space: normal; font-size: .8rem; }
   .figures td:first-child { position: sticky; left: 0; min-width: 7rem; background: #fff; } }
-@media print { body { margin: 0; max-width: none; font-size: 10pt; }
+@media print { body { margin: 0; max-width: none; font-size: 10pt; } .wide { overflow: visible; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } pre { white-space: pre-wrap; } }
 """
 
