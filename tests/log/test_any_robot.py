@@ -17,6 +17,7 @@ from play_rig import (
 )
 from rosbags.highlevel import AnyReader
 from tautscope import HysteresisReduction, Pose, Tip
+from tautscope.commands.robot import bytes_per_second
 from tautscope.config import Config, Sine, axes, load_config
 from tautscope.errors import ConfigError, RecordError
 from tautscope.log import topics
@@ -73,6 +74,13 @@ def assert_replays(path: Path, run: Recording) -> None:
             table, expected = getattr(recording, name), getattr(run, name)
             assert table.dtype == expected.dtype
             assert table.tobytes() == expected.tobytes(), name
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_a_run_needs_no_more_room_than_is_announced(tmp_path: Path, count: int) -> None:
+    record(tmp_path / "run.mcap", axes(count, width_limit=1.0)).write(tmp_path)
+    size = sum(file.stat().st_size for file in tmp_path.iterdir())
+    assert 0.5 < size / (bytes_per_second(count) * SECONDS) < 1.0
 
 
 @pytest.mark.parametrize("count", [1, 5, 8])

@@ -21,8 +21,8 @@ from tautscope.runs.recording import Recording
 
 DURATION = 120.0
 """Duration of each of the two runs [s]."""
-BYTES_PER_SECOND = 170e3
-"""Of logs and tables of three degrees of freedom."""
+BYTES_PER_SECOND = 60e3, 40e3
+"""Of logs and tables: of any robot, and of each degree of freedom beside that."""
 
 
 def add_seconds(parser: argparse.ArgumentParser, of: str, default: float = DURATION) -> None:
@@ -33,6 +33,12 @@ def add_seconds(parser: argparse.ArgumentParser, of: str, default: float = DURAT
         metavar="T",
         help=f"duration of a motion of {of} [{default:g} s]",
     )
+
+
+def bytes_per_second(dofs: int) -> float:
+    """Largest size of log and tables of a run per second."""
+    of_any, of_each = BYTES_PER_SECOND
+    return of_any + of_each * dofs
 
 
 def run(
@@ -53,7 +59,7 @@ def run(
     folder = arguments.out_folder(options)
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration
-    announce("2 runs", seconds, seconds * BYTES_PER_SECOND, folder)
+    announce("2 runs", seconds, seconds * bytes_per_second(len(config.dof)), folder)
     if getattr(options, "rig", None) is not None:
         confirm_motion(options, "over up to 60 % of each range. Keep", config)
     runs: list[Recording] = []
