@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mcap.writer import MCAP0_MAGIC, Writer
 from rosbags.highlevel import AnyReader
+from tautscope.cli import main
 from tautscope.errors import MissingPathError, OutputError, RecordError
 from tautscope.log.export import export_rosbag, recover
 from tautscope.log.mcap_records import Damage
@@ -116,3 +117,11 @@ def test_files_that_are_not_logs_are_rejected(tmp_path: Path, recorded: Recorded
     with pytest.raises(OutputError, match="does not exist yet"):
         recover(recorded[0], recorded[0])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["head.mcap", "text.mcap"]
+
+
+def test_a_folder_in_place_of_a_log_is_answered_with_its_log(
+    recorded: Recorded, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for verb, *option in (["replay"], ["recover"], ["export", "--csv"], ["export", "--rosbag=b"]):
+        assert main([verb, str(recorded[0].parent), *option]) == 2
+        assert f"an MCAP file, such as {recorded[0]}" in capsys.readouterr().err

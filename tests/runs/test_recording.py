@@ -97,6 +97,16 @@ def test_an_input_that_cannot_be_read_is_no_output(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_error_of_a_file_in_a_new_folder_names_the_folder(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OutputError, match="disk full") as found,
+        new_folder(tmp_path / "bag") as new,
+        new_file(new / "bag_0.mcap"),
+    ):
+        raise OSError("disk full")
+    assert found.value.value == str(tmp_path / "bag")
+
+
 @pytest.mark.parametrize("is_new", [True, False])
 def test_results_are_kept_if_the_folder_was_taken_meanwhile(is_new: bool, tmp_path: Path) -> None:
     folder = tmp_path / "run"

@@ -17,7 +17,7 @@ from tautscope.commands.positions import (
 )
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import Config, load_config
-from tautscope.errors import FieldError, MissingPathError
+from tautscope.errors import FieldError
 from tautscope.extras import require_extras
 from tautscope.hardware.video import read_video
 from tautscope.log.comparison import write_replay
@@ -141,8 +141,10 @@ def _export(options: argparse.Namespace) -> None:
 
 
 def _beside(file: Path, end: str) -> Path:
+    from tautscope.log.mcap_records import no_log  # noqa: PLC0415
+
     if not file.is_file():
-        raise MissingPathError("log", str(file), "an MCAP file")
+        raise no_log(file)
     return file.with_name(f"{file.stem}{end}")
 
 

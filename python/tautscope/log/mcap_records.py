@@ -102,6 +102,14 @@ def read_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
             return
 
 
+def no_log(path: Path) -> MissingPathError:
+    """The error of a path that is no file; of a folder it names a log in it."""
+    found = min(map(str, path.glob("*.mcap")), default=None)
+    return MissingPathError(
+        "log", str(path), "an MCAP file" + (f", such as {found}" if found else "")
+    )
+
+
 def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Message]]:
     """Read the undamaged messages of an MCAP file with record and topic, in the file's order.
 
@@ -113,7 +121,7 @@ def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, 
     try:
         file = path.open("rb")
     except (FileNotFoundError, IsADirectoryError):
-        raise MissingPathError("log", str(path), "an MCAP file") from None
+        raise no_log(path) from None
     with file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordError("log", str(path), "an MCAP file")

@@ -90,8 +90,11 @@ def _beside(target: Path) -> Path:
     return target.with_name(f".{target.name}.{os.getpid()}.partial")
 
 
-def _as_output(error: OSError, target: Path, partial: Path) -> OSError | OutputError:
+def _as_output(error: OSError | OutputError, target: Path, partial: Path) -> OSError | OutputError:
     """The error of an output, unless it names another file, such as an input."""
+    if isinstance(error, OutputError):
+        is_part = str(error.value).startswith(str(partial))
+        return OutputError("out", str(target), error.allowed) if is_part else error
     if not str(error.filename or partial).startswith(str(partial)):
         return error
     return OutputError("out", str(target), f"a place that can be written ({error})")
@@ -125,7 +128,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
         yield partial
     except BaseException as error:
         shutil.rmtree(partial, ignore_errors=True)
-        if isinstance(error, OSError):
+        if isinstance(error, OSError | OutputError):
             raise _as_output(error, target, partial) from None
         raise
     try:
