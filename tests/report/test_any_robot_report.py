@@ -1,5 +1,7 @@
 """Figures of merit, tables and figure of a robot with [[dof]], from runs with known errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tautscope.config import axes
@@ -52,6 +54,20 @@ def test_figures_are_of_each_degree_of_freedom(knows_tip: bool, tip: str) -> Non
     assert all(f"<th>{name} [rad]</th>" in section for name in NAMES)
     assert "goal" not in section
     assert len(run.figure()[1].axes) == len(replay_figure(run.main).axes) == 10
+
+
+@pytest.mark.parametrize("is_short", ["compensated", "uncompensated"])
+def test_runs_are_compared_while_both_last(is_short: str) -> None:
+    """The error grows with time, three times as fast without compensation."""
+    runs = []
+    for share, name in ((-3.0, "uncompensated"), (1.0, "compensated")):
+        run = recording(0.0, compensated=name == "compensated")
+        for dof in NAMES:
+            run.trace[f"true_{dof}"] += share * TIME
+        count = len(TIME) * 3 // 4 if name == is_short else len(TIME)
+        runs.append(replace(run, trace=run.trace[:count]))
+    for found in RecordedRun(runs[1], runs[0]).to_json().values():
+        assert found["reduction"] == pytest.approx(2 / 3)
 
 
 def test_slack_wider_than_the_travel_is_unknown() -> None:

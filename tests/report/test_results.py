@@ -1,5 +1,7 @@
 """Table 1 from two synthetic runs with known figures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -64,6 +66,14 @@ def test_widths_are_of_the_last_two_periods(result: DofResult) -> None:
     assert result.compensated_max == pytest.approx(0.2, rel=1e-2)
     assert result.reduction == pytest.approx(0.8, rel=1e-3)
     assert result.reduction_max == pytest.approx(0.8, rel=1e-2)
+
+
+def test_a_part_that_the_uncompensated_run_did_not_complete_is_not_compared() -> None:
+    after = recording(3 * REFERENCE, TIP, TIP, compensated=True)
+    before = replace(recording(REFERENCE, WIDE, WIDE, compensated=False), segments=())
+    found = evaluate(before, after)[Dof.BENDING]
+    assert np.isnan([found.uncompensated, found.reduction, found.uncompensated_estimate]).all()
+    assert found.compensated == pytest.approx(0.2, rel=1e-3)
 
 
 def test_widths_by_camera_are_of_the_estimates(result: DofResult) -> None:

@@ -107,8 +107,12 @@ def motion_of(config: Config, seed: int, duration: float) -> OperatorMotion:
 
 def evaluated_after(recording: Recording) -> float:
     """From when on a run is evaluated: after 40 s, or half of a shorter run [s]."""
+    return min(EVALUATED_AFTER, _duration(recording) / 2)
+
+
+def _duration(recording: Recording) -> float:
     time = recording.trace["time"]
-    return min(EVALUATED_AFTER, float(time[-1] - time[0]) / 2)
+    return float(time[-1] - time[0])
 
 
 def tip_and_reference(recording: Recording, dof: NamedDof) -> tuple[Floats, Floats, Floats]:
@@ -127,10 +131,13 @@ def evaluate_operator_motion(
 ) -> OperatorResults:
     """The figures of every DOF from a run with compensation, and one without it if there is one.
 
-    The bound, which takes seconds, is NaN without `has_bound`.
+    Where one of them ended early, they are compared up to there. The bound, which takes seconds, is
+    NaN without `has_bound`.
     """
     run = compensated.trace
-    first = int(run["time"].searchsorted(run["time"][0] + evaluated_after(compensated)))
+    start = evaluated_after(compensated)
+    end = min(_duration(each) for each in (uncompensated or compensated, compensated))
+    first = int(run["time"].searchsorted(run["time"][0] + start))
     config = compensated.config
     references = per_dof(run, "reference", config.dofs)
     bounds = np.full(len(config.dofs), np.nan)
@@ -139,14 +146,14 @@ def evaluate_operator_motion(
     results: OperatorResults = {}
     for index, dof in enumerate(config.dofs):
         tip = run[f"true_{dof.label}"][first:]
-        errors = _tracking_errors(compensated, dof)
-        before = (
-            np.nan if uncompensated is None else metrics.rms(_tracking_errors(uncompensated, dof))
+        errors = _tracking_errors(compensated, dof, start)
+        before, after = (
+            np.nan if each is None else metrics.rms(_tracking_errors(each, dof, start, end))
+            for each in (uncompensated, compensated)
         )
-        after = metrics.rms(errors)
         results[dof] = OperatorResult(
             uncompensated_rms=before,
-            compensated_rms=after,
+            compensated_rms=metrics.rms(errors),
             reduction=metrics.reduction(before, after),
             largest=metrics.largest_error(np.zeros_like(errors), errors),
             overspeed=metrics.tip_overspeed(run["time"][first:], references[first:, index], tip),
@@ -164,8 +171,12 @@ def evaluate_uncompensated_motion(recording: Recording) -> OperatorResults:
     return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
-def _tracking_errors(recording: Recording, dof: NamedDof) -> Floats:
+def _tracking_errors(
+    recording: Recording, dof: NamedDof, start: float, end: float = np.inf
+) -> Floats:
+    """Tip less reference [m or rad] from `start` to `end` [s after the begin of the run]."""
     time, tip, reference = tip_and_reference(recording, dof)
-    counts = time >= recording.trace["time"][0] + evaluated_after(recording)
+    elapsed = time - recording.trace["time"][0]
+    counts = (elapsed >= start) & (elapsed <= end)
     errors: Floats = tip[counts] - reference[counts]
     return errors

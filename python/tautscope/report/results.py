@@ -136,9 +136,15 @@ Results = dict[NamedDof, DofResult]
 
 
 def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results:
-    """The figures of every DOF with a segment; the uncompensated run is optional."""
+    """The figures of every DOF with a segment.
+
+    The uncompensated run is optional, and so is a DOF's segment in it.
+    """
+    plain = () if uncompensated is None else tuple(each.dof for each in uncompensated.segments)
     return {
-        segment.dof: _dof_result(segment, uncompensated, compensated)
+        segment.dof: _dof_result(
+            segment, uncompensated if segment.dof in plain else None, compensated
+        )
         for segment in compensated.segments
     }
 
