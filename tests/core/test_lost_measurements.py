@@ -136,3 +136,30 @@ def test_the_log_says_once_that_ticks_come_at_another_interval(
     lines = [line for line in caplog.messages if "control.period" in line]
     assert len(lines) == (share != 1.2)
     assert all(f"ticks come every {interval:.4g} s" in line for line in lines)
+
+
+def test_the_log_tells_of_a_pause_and_of_each_hold(caplog: pytest.LogCaptureFixture) -> None:
+    loop = HysteresisReduction(from_document({"dof": [DOF]}))
+    for tick in range(900):
+        pauses = tick // 300
+        if tick == 450:
+            loop.engage()
+        loop.step([0.0], 0.005 * tick + 3600 * pauses)
+        loop.on_tip([0.0], 0.005 * tick + 3600 * pauses)
+    lines = [line for line in caplog.messages if "Motion is held" in line]
+    assert len(lines) == len(caplog.messages) == 2
+    assert all("re-engage" in line for line in lines)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_log_says_once_what_is_warned_of_all_the_time(
+    count: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A driver that gives each measurement twice, and one in order."""
+    loop = HysteresisReduction(from_document({"dof": [DOF]}))
+    for tick in range(4000):
+        loop.step([0.0], 0.005 * tick)
+        for _ in range(count):
+            loop.on_tip([0.0], 0.005 * tick)
+    assert len(caplog.messages) == count - 1
+    assert all("duplicate for 1000 ticks" in line for line in caplog.messages)

@@ -7,8 +7,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from functools import cached_property, partial, wraps
+from threading import RLock
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,7 @@ from tautscope.loop.construction import build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
 from tautscope.loop.measurement import Measurement, Points, Pose, Reading, Sensors, Tip
 from tautscope.loop.rig import Frame
-from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
+from tautscope.loop.safety import Reaction, Supervision, advice, checksum, disabled_monitors
 from tautscope.loop.signal_checks import (
     check_covariance,
     check_features,
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from tautscope import _core
     from tautscope.loop.vision import Detection, MarkerDetector
 
+Arguments = ParamSpec("Arguments")
+Loop = TypeVar("Loop", bound="HysteresisReduction")
+Result = TypeVar("Result")
 Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
@@ -43,6 +47,8 @@ LOGGED_TICKS = 100
 """After so many ticks each the log says, once, why nothing is compensated or ticks are late."""
 OTHER_INTERVAL = math.log(1.4)
 """Logarithm of the ratio from which on ticks are not at `control.period`; jitter averages out."""
+LASTING = 10
+"""After so many times `LOGGED_TICKS` with a warning the log says it, once."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -155,12 +161,25 @@ class HysteresisEstimate:
     image_shift_std: NDArray[np.float64] | None = None
 
 
+def _exclusive(
+    call: Callable[Concatenate[Loop, Arguments], Result],
+) -> Callable[Concatenate[Loop, Arguments], Result]:
+    """A method that waits for those of other threads: measurements call models in Python."""
+
+    @wraps(call)
+    def wait(loop: Loop, /, *arguments: Arguments.args, **keys: Arguments.kwargs) -> Result:
+        with loop._lock:
+            return call(loop, *arguments, **keys)
+
+    return wait
+
+
 class HysteresisReduction:
     """Image-based hysteresis reduction, Fig. 6: `step` at the control rate, `on_frame` per image.
 
     Of a robot with [[dof]] every array has n entries in its order, and in place of images there are
     `on_tip`, `on_pose`, `on_points` and `on_measurement`. What is late, repeated or out of order is
-    treated as an image; of several sensors each counts by itself.
+    treated as an image; of several sensors each counts by itself. Any thread may call any method.
 
     Args:
         config: All settings of the loop.
@@ -175,6 +194,7 @@ class HysteresisReduction:
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = check_config(config)
+        self._lock = RLock()
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
@@ -187,8 +207,10 @@ class HysteresisReduction:
         self._limited: tuple[str, ...] = ()
         self._limited_before: set[str] = set()
         self._least_logged = Reaction.FADE if compensate else Reaction.HOLD_MOTION
-        self._logged: set[Reaction] = set()
-        self._logged_at, self._has_logged_interval = math.nan, False
+        self._logged: set[str] = set()
+        self._lasting: dict[str, int] = {}
+        self._time = self._logged_at = math.nan
+        self._longest, self._has_logged_interval = 0.0, False
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -197,6 +219,7 @@ class HysteresisReduction:
             f"reaction {self.supervision.reaction}, slack {slack}>"
         )
 
+    @_exclusive
     def step(
         self, reference: ArrayLike, time: float | None = None, made_at: float | None = None
     ) -> NDArray[np.float64]:
@@ -224,9 +247,13 @@ class HysteresisReduction:
         time = check_time("time", time)
         made_at = None if made_at is None else check_time("made_at", made_at)
         self._ticks += 1
+        self._longest = max(self._longest, time - self._time)
+        self._time = time
         self._limited = ()
         if self._ticks % LOGGED_TICKS == 0:  # no report tells of measurements that do not come
-            self._log_reaction(time, self.supervision)
+            now = self.supervision
+            self._log_reaction(time, now)
+            self._log_warnings(time, now)
             self._log_interval(time)
         return self._loop.step(
             values, time, made_at, None if self._actuators is None else self._within_limits
@@ -389,19 +416,23 @@ class HysteresisReduction:
         return self._update_by(reading, measurement.captured_at, measurement.sensor)
 
     @property
+    @_exclusive
     def supervision(self) -> Supervision:
         """Reaction and flags in force now."""
         reaction, flags, latched, lead = self._loop.supervision
         return Supervision(Reaction(reaction), tuple(flags), tuple(latched), lead)
 
+    @_exclusive
     def engage(self) -> None:
         """Re-engage: resume held motion, without a jump of the command.
 
         A cause that persists stops the motion again at once; a flag that needs a restart remains.
         """
         self._loop.engage()
+        self._logged.difference_update(Reaction)  # the log tells of the next hold, too
         self._notify("engage")
 
+    @_exclusive
     def acknowledge(self) -> None:
         """Acknowledge the warnings: empty `Supervision.latched`; nothing else changes.
 
@@ -410,6 +441,7 @@ class HysteresisReduction:
         self._loop.acknowledge()
         self._notify("acknowledge")
 
+    @_exclusive
     def set_compensation(self, share: float) -> None:
         """Use a share of the compensation: all with 1, none with 0.
 
@@ -425,6 +457,7 @@ class HysteresisReduction:
         self._loop.set_compensation(value)
         self._notify(f"set_compensation {value!r}")
 
+    @_exclusive
     def raise_flag(self, name: str) -> None:
         """Raise a flag that only the rig can detect: ``drive_fault``, ``following_error``.
 
@@ -434,6 +467,7 @@ class HysteresisReduction:
         self._loop.raise_flag(name)
         self._notify(f"raise_flag {name}")
 
+    @_exclusive
     def predict_state(self, captured_at: float) -> StatePrediction | None:
         """State at a capture time: the model's, corrected by the last images, with its std.
 
@@ -442,6 +476,7 @@ class HysteresisReduction:
         prediction = self._band_loop("predict_state").predict_state(captured_at)
         return None if prediction is None else StatePrediction(*prediction)
 
+    @_exclusive
     def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:
         """h(q) (4,) [px] at a capture time, Eq. (9), for a marker detector of your own.
 
@@ -450,6 +485,7 @@ class HysteresisReduction:
         return self._band_loop("predicted_features").predicted_features(captured_at)
 
     @property
+    @_exclusive
     def reference(self) -> NDArray[np.float64]:
         """The reference that the law follows (n,) [m or rad]; NaN before the first.
 
@@ -459,21 +495,25 @@ class HysteresisReduction:
         return self._loop.reference
 
     @property
+    @_exclusive
     def predicted_state(self) -> NDArray[np.float64]:
         """The model's tip state q (n,) [m or rad] now; NaN before the first tick."""
         return self._loop.predicted_state
 
     @property
+    @_exclusive
     def delta_minus(self) -> NDArray[np.float64]:
         """The estimated negative contact offsets (n,) [m or rad], input minus output."""
         return self._loop.delta_minus
 
     @property
+    @_exclusive
     def delta_plus(self) -> NDArray[np.float64]:
         """The estimated positive contact offsets (n,) [m or rad], input minus output."""
         return self._loop.delta_plus
 
     @property
+    @_exclusive
     def hysteresis(self) -> HysteresisEstimate | None:
         """The estimated hysteresis; None in profile ``paper``."""
         if self._config.profile == "paper":
@@ -503,6 +543,7 @@ class HysteresisReduction:
             raise SignalError(call, "no [[dof]]", "a configuration with [[dof]]; tautscope.axes")
         return self._sensors
 
+    @_exclusive
     def _update_by(self, reading: Reading, captured_at: float, sensor: int) -> Report:
         captured_at = check_time("captured_at", captured_at)
         if not isinstance(sensor, int | np.integer) or sensor not in range(MOST_SENSORS):
@@ -536,9 +577,21 @@ class HysteresisReduction:
             self._logged.add(now.reaction)
             _LOG.warning("at %.3f s: %s", time, now.effect)
 
+    def _log_warnings(self, time: float, now: Supervision) -> None:
+        # Other reactions have a line of their own.
+        is_warning = now.reaction is Reaction.WARN and self._least_logged is Reaction.FADE
+        flags = now.flags if is_warning else ()
+        self._lasting = {flag: self._lasting.get(flag, 0) + 1 for flag in flags}
+        for flag, count in self._lasting.items():
+            if count == LASTING and flag not in self._logged:
+                self._logged.add(flag)
+                ticks = LASTING * LOGGED_TICKS
+                _LOG.warning("at %.3f s: %s for %d ticks: %s", time, flag, ticks, advice(flag))
+
     def _log_interval(self, time: float) -> None:
-        interval = (time - self._logged_at) / LOGGED_TICKS
-        self._logged_at = time
+        # Without the longest one: a pause is no interval.
+        interval = (time - self._logged_at - self._longest) / (LOGGED_TICKS - 1)
+        self._logged_at, self._longest = time, 0.0
         period = self._config.control.period
         is_other = interval > 0 and abs(math.log(interval / period)) > OTHER_INTERVAL
         if is_other and not self._has_logged_interval:
@@ -551,6 +604,7 @@ class HysteresisReduction:
         if self.on_event is not None:
             self.on_event(what)
 
+    @_exclusive
     def _update(
         self,
         features: NDArray[np.float64] | None,

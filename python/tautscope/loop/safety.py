@@ -28,7 +28,7 @@ REMEDIES: dict[str, str] = {
     "reference_invalid": "check the input device, then re-engage",
     "reference_jump": "let go of the input device, then re-engage",
     "reference_late": "check the connection of the input device, then re-engage",
-    "late_tick": "close other programs on this computer",
+    "late_tick": "close other programs on this computer, and after a pause re-engage",
     "start_check": "check the signs of motors and sensors, then re-engage",
     "limit_cycle": "move more slowly",
     "dropped": "check the camera or sensor; a slow one needs a larger safety.frame_gap",
@@ -41,14 +41,15 @@ REMEDIES: dict[str, str] = {
     "lost": "bring the bands into the image, or check the sensor",
     "innovation": "look at the image, or check scale and zero of the sensor, and rest for a moment",
     "merged": "bring both bands into the image, or check the sensor",
-    "unobservable": "bend the section a little",
+    "unobservable": "bend the section a little, or check the sensor",
     "overcompensation": "move slowly until the slack is learned",
     "slack_changed": "move slowly until the slack is learned",
     "tremor": "scale the motion down",
     "reference_fast": "move more slowly",
     "geometry_off": "run tautscope calibrate geometry, for a sensor tautscope calibrate robot, or"
     " give its deviation in [measurement]",
-    "width_limit": "raise safety.width_limit if the instrument has more slack",
+    "width_limit": "raise width_limit if there is more slack, or check zero and scale of the"
+    " sensor",
 }
 """What to do about each flag, as a phrase that begins with a verb; the most urgent first."""
 
