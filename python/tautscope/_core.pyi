@@ -11,6 +11,7 @@ __all__ = [
     "MOST_RANGE",
     "MOST_SENSORS",
     "MOST_VALUES",
+    "OFFSET_LIMIT",
     "SPEED",
     "Camera",
     "Compensator",
@@ -38,6 +39,7 @@ MOST_DOFS: int
 MOST_SENSORS: int
 MOST_VALUES: int
 MOST_RANGE: float
+OFFSET_LIMIT: float
 SPEED: float
 
 # Models, estimation, compensation, supervision: crates/core.

@@ -1,6 +1,9 @@
 """Loops of 1 to 8 degrees of freedom with any sensor of the tip."""
 
+import tomllib
 from collections.abc import Callable
+from copy import copy, deepcopy
+from pickle import dumps
 from typing import Any, Literal
 
 import numpy as np
@@ -8,7 +11,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 from tautscope import Config, HysteresisReduction, Report, axes
-from tautscope.config import DofEntry, KinematicsConfig, Sine, from_document
+from tautscope.config import DofEntry, KinematicsConfig, Sine, dump_config, from_document
 from tautscope.errors import SignalError
 from tautscope.loop.kinematics import TwoPlanes
 from tautscope.loop.references import OperatorMotion
@@ -144,6 +147,24 @@ def test_a_long_first_stroke_does_not_keep_a_slack_that_is_not_there() -> None:
         errors.append((tip - reference)[0])
     # The first reversal is at 12.5 s.
     assert np.std(errors[4000:]) < 0.01
+
+
+def test_a_loop_begins_with_what_was_estimated() -> None:
+    """A slack of a sixth of the expected one, and one as wide as can be."""
+    for width in (0.15, 0.88):
+        loop = HysteresisReduction(axes(1, width_limit=0.9))
+        operate(loop, Plays([width]), on_tip(0.002), seconds=30.0)
+        config = tomllib.loads(dump_config(loop.estimated_config()))
+        next_one = HysteresisReduction(from_document(config))
+        found, begun = (each.delta_plus - each.delta_minus for each in (loop, next_one))
+        np.testing.assert_allclose(found, width, rtol=0.1)
+        assert abs(begun - found) < 0.3 * abs(found - 0.6)  # 0.6 are expected
+
+
+@pytest.mark.parametrize("copied", [copy, deepcopy, dumps])
+def test_a_loop_has_no_copy(copied: Callable[[object], object]) -> None:
+    with pytest.raises(TypeError, match="estimated_config"):
+        copied(HysteresisReduction(axes(1, width_limit=0.9)))
 
 
 def test_motion_beyond_the_range_is_discarded_which_the_followed_reference_shows() -> None:

@@ -99,6 +99,8 @@ CONFIGURATIONS: list[Case] = [
     (lambda: one(gain_limit=0.5), "dof[0].gain_limit", "0.5", "from 1 to 50"),
     (lambda: one(expected_width=2.0), "dof[0].expected_width", "2.0", "width_limit"),
     (lambda: one(delta_minus=0.2), "dof[0].delta_minus", "0.2", "delta_plus"),
+    (lambda: one(delta_plus=0.8), "dof[0].delta_plus", "0.8", "0.667, 2/3 width_limit"),
+    (lambda: one(delta_minus=-0.6, delta_plus=0.6), "dof[0].delta_plus", "0.6", "at most 0.4"),
     (lambda: one(widht=1.0), "dof[0].widht", "1.0", "no such key"),
     (lambda: from_document({"dof": [{"name": "a"}]}), "dof[0].width_limit", "None", "no default"),
     (lambda: from_document({"dof": {"name": "a"}}), "dof", "'a'", "a list"),

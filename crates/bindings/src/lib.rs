@@ -74,6 +74,7 @@ mod _core {
         module.add("MOST_SENSORS", tautscope_core::SENSORS)?;
         module.add("MOST_VALUES", tautscope_core::VALUES)?;
         module.add("MOST_RANGE", tautscope_config::MOST_RANGE)?;
+        module.add("OFFSET_LIMIT", tautscope_config::OFFSET_LIMIT)?;
         module.add("SPEED", tautscope_config::SPEED)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

@@ -8,7 +8,10 @@ use tautscope_core as core;
 use crate::any_loop::{AnyLoop, Profile, entries};
 
 // The article's instrument has about these ratios of its lengths to safety.width_limit.
-const OFFSET_LIMIT: f64 = 2.0 / 3.0;
+/// Largest absolute value of a contact offset, in `width_limit`.
+pub const OFFSET_LIMIT: f64 = 2.0 / 3.0;
+/// An estimate at a limit may be an initial offset.
+const ROUNDING: f64 = 1.0 + 1e-9;
 const EXPECTED_WIDTH: f64 = 2.0 / 3.0;
 const START_DEVIATION: f64 = 0.3;
 const UPDATES: f64 = 50.0;
@@ -211,7 +214,18 @@ impl AxisSettings {
         {
             return Err(error("expected_width", expected, "at most width_limit"));
         }
-        core::Play::new(self.delta_minus, self.delta_plus).map(|_| ())
+        core::Play::new(self.delta_minus, self.delta_plus)?;
+        let (minus, plus) = (self.delta_minus, self.delta_plus);
+        for (name, offset) in [("delta_minus", minus), ("delta_plus", plus)] {
+            if offset.abs() > OFFSET_LIMIT * width * ROUNDING {
+                return Err(error(name, offset, "at most 2/3 width_limit from 0"));
+            }
+        }
+        if plus - minus > width * ROUNDING {
+            let allowed = "at most width_limit above delta_minus";
+            return Err(error("delta_plus", plus, allowed));
+        }
+        Ok(())
     }
 
     fn speed(&self) -> f64 {

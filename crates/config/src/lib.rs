@@ -10,7 +10,7 @@ mod error;
 mod ranges;
 
 pub use any_loop::{AnyLoop, Profile, Selection};
-pub use axes::{AxesSettings, AxisSettings, MOST_RANGE, SPEED};
+pub use axes::{AxesSettings, AxisSettings, MOST_RANGE, OFFSET_LIMIT, SPEED};
 #[cfg(feature = "toml")]
 pub use document::{Configuration, Dof};
 #[cfg(feature = "toml")]

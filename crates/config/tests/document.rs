@@ -229,6 +229,14 @@ fn errors_name_the_degree_of_freedom() {
             "dof[1].delta_minus: got 1, expected at most delta_plus",
         ),
         (
+            second("delta_plus = 0.8"),
+            "dof[1].delta_plus: got 0.8, expected at most 2/3 width_limit",
+        ),
+        (
+            second("delta_minus = -0.6\ndelta_plus = 0.6"),
+            "dof[1].delta_plus: got 0.6, expected at most width_limit above",
+        ),
+        (
             second("unit = \"mm\""),
             "dof[1].unit: got \"mm\", expected \"m\" or \"rad\"",
         ),

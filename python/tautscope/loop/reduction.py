@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, partial, wraps
 from threading import RLock
-from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Concatenate, NoReturn, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope._core import MOST_SENSORS
-from tautscope.config import Config, check_config
-from tautscope.dof import display_text
+from tautscope.config import Config, check_config, from_document, to_document
+from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.construction import build_loop
@@ -519,6 +519,23 @@ class HysteresisReduction:
         if self._config.profile == "paper":
             return None
         return HysteresisEstimate(*self._loop.hysteresis)
+
+    @_exclusive
+    def estimated_config(self) -> Config:
+        """The configuration with the contact offsets estimated so far as initial ones.
+
+        A loop made of it, the next day or for the next episode, begins with this slack.
+        `tautscope.config.dump_config` writes it.
+        """
+        document = to_document(self._config)
+        sections = document["dof"] or [document[dof.label] for dof in Dof]
+        offsets = zip(self.delta_minus.tolist(), self.delta_plus.tolist(), strict=True)
+        for section, (minus, plus) in zip(sections, offsets, strict=True):
+            section.update(delta_minus=minus, delta_plus=plus)
+        return from_document(document)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("A loop has no copy; make a new one of its estimated_config()")
 
     @cached_property
     def _detector(self) -> MarkerDetector:
