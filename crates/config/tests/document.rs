@@ -178,6 +178,25 @@ fn errors_name_the_key() {
 }
 
 #[test]
+fn errors_of_initial_offsets_name_their_limits() {
+    let one = |keys: &str| format!("{ONE}{keys}");
+    check_errors(&[
+        (
+            one("delta_minus = 1"),
+            "dof[0].delta_minus: got 1, expected at most delta_plus",
+        ),
+        (
+            one("delta_plus = 0.8"),
+            "dof[0].delta_plus: got 0.8, expected at most 2/3 width_limit",
+        ),
+        (
+            one("delta_minus = -0.6\ndelta_plus = 0.6"),
+            "dof[0].delta_plus: got 0.6, expected at most width_limit above",
+        ),
+    ]);
+}
+
+#[test]
 fn errors_name_the_degree_of_freedom() {
     let dof = |keys: &str| format!("{ONE}{keys}");
     let second = |keys: &str| dof(&format!("{}{keys}", ONE.replace("\"a\"", "\"b\"")));
@@ -224,18 +243,6 @@ fn errors_name_the_degree_of_freedom() {
             "dof[1].expected_width: got -1",
         ),
         (second("gain_limit = 0.5"), "dof[1].gain_limit: got 0.5"),
-        (
-            second("delta_minus = 1"),
-            "dof[1].delta_minus: got 1, expected at most delta_plus",
-        ),
-        (
-            second("delta_plus = 0.8"),
-            "dof[1].delta_plus: got 0.8, expected at most 2/3 width_limit",
-        ),
-        (
-            second("delta_minus = -0.6\ndelta_plus = 0.6"),
-            "dof[1].delta_plus: got 0.6, expected at most width_limit above",
-        ),
         (
             second("unit = \"mm\""),
             "dof[1].unit: got \"mm\", expected \"m\" or \"rad\"",
