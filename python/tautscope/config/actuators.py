@@ -1,7 +1,5 @@
 """Motors of a robot whose motors are not its degrees of freedom."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

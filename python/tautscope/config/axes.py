@@ -1,7 +1,5 @@
 """The degrees of freedom of any robot, its kinematics, and the noise of its sensors."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from msgspec import Meta

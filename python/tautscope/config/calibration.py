@@ -1,7 +1,5 @@
 """Configuration of the calibration: when, with which devices and how well it was done."""
 
-from __future__ import annotations
-
 from datetime import datetime
 
 from msgspec import field

@@ -1,7 +1,5 @@
 """Configuration of the camera: projection, image source, pose of the guide."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from msgspec import Meta, field

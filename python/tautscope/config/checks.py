@@ -1,7 +1,5 @@
 """Relations between sections; each check raises `ConfigError` with the key from the root."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

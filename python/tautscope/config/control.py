@@ -1,7 +1,5 @@
 """Settings of the control loop: timing, both profiles, and the article's degrees of freedom."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta

@@ -4,8 +4,6 @@ The commented template (`tautscope config`) and the reference page (docs/configu
 come from here.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

@@ -1,7 +1,5 @@
 """What a section ``drives`` has by default: of its preset, its protocol, and each motor."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Configuration of the drives or servos on a bus."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 

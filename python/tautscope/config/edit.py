@@ -1,7 +1,5 @@
 """Changing values in a TOML file in place: comments and order stay."""
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """The article's instrument and experiment."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta, field

@@ -1,7 +1,5 @@
 """Reading and writing of TOML."""
 
-from __future__ import annotations
-
 import logging
 import tomllib
 from collections.abc import Sequence

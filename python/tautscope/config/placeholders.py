@@ -4,8 +4,6 @@ A key, table or entry of a TOML file is one if the comment beside it has the wor
 ``tautscope/config/rigs/article_rig.toml``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from os import PathLike
 from typing import Any

@@ -1,7 +1,5 @@
 """Types and ranges of configuration values in words."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import reduce
 from typing import Any

@@ -1,7 +1,5 @@
 """Configuration of the log of a run."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, get_args
 
 from msgspec import Meta

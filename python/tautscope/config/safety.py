@@ -1,7 +1,5 @@
 """Limits of the monitors, and the duration of the supervisor's reactions."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta

@@ -1,7 +1,5 @@
 """Base of the sections of a configuration: every constructor checks its values."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Models of servos."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 COUNTS_PER_TURN = 4096

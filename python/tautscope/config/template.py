@@ -1,7 +1,5 @@
 """A configuration as TOML that explains itself: each key with its meaning, unit and range."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Collection, Iterator
 

@@ -1,7 +1,5 @@
 """Configuration of the simulated rig."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta, field

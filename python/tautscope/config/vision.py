@@ -1,7 +1,5 @@
 """Settings of the marker detection."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta, field

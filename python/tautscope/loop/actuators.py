@@ -1,7 +1,5 @@
 """Motors that are not the degrees of freedom: the map between a command and their positions."""
 
-from __future__ import annotations
-
 import inspect
 import logging
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Construction of the blocks of the core from a configuration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgspec

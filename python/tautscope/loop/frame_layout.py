@@ -12,8 +12,6 @@ The shapes are those of OpenCV's `cvtColor` codes: a frame grabbed with ``CAP_PR
 needs no conversion. Y, U, V are ITU-R BT.601 with limited range.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

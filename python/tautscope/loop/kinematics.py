@@ -1,7 +1,5 @@
 """Where the tip is in a state of the degrees of freedom."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
@@ -31,7 +29,6 @@ class Kinematics(Protocol):
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
-        ...
 
 
 class TwoPlanes:

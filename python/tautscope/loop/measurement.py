@@ -1,7 +1,5 @@
 """What a sensor measures of the tip, as values, covariance and a model of the sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

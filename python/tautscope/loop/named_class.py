@@ -1,7 +1,5 @@
 """Classes of the user, by the name of their module and their own."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Operating states of the collaborative robotics toolkit (CRTK), one machine for all of ROS 2."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import NamedTuple
 

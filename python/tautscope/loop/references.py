@@ -1,7 +1,5 @@
 """Reference trajectories: where the tip should be, and which DOF moves when."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,11 +44,9 @@ class Motion(Protocol):
     @property
     def duration(self) -> float:
         """Duration [s]."""
-        ...
 
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(n,) [m or rad] at `time` [s from its start]."""
-        ...
 
 
 class Reference(Motion, Protocol):
@@ -59,7 +55,6 @@ class Reference(Motion, Protocol):
     @property
     def segments(self) -> Sequence[Segment]:
         """Which DOF moves when; may be empty."""
-        ...
 
 
 @runtime_checkable
@@ -72,7 +67,6 @@ class DatedReference(Reference, Protocol):
     @property
     def made_at(self) -> float:
         """Time at which the last returned value was made [s from the start of the reference]."""
-        ...
 
 
 class SineSequence:

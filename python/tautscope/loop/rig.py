@@ -3,8 +3,6 @@
 A rig takes commands and returns samples. It owns the clock.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -85,19 +83,15 @@ class Rig(Protocol):
     @property
     def control_period(self) -> float:
         """Time from one command to the next [s]."""
-        ...
 
     def reset(self) -> Sample:
         """Go to the start; the returned sample has the time of the clock then."""
-        ...
 
     def step(self, command: ArrayLike) -> Sample:
         """Send a command (n,) [m or rad] and let one control period pass."""
-        ...
 
     def close(self) -> None:
         """Stop the motors and release all resources; a second call does nothing."""
-        ...
 
 
 def reset_unless(rig: Rig, must_stop: Callable[[], bool]) -> Sample:

@@ -1,7 +1,5 @@
 """Flags, reactions and state of the supervisor."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Checks of the numbers that go into the loop."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

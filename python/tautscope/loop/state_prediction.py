@@ -1,7 +1,5 @@
 """The state of the instrument predicted for the time an image was captured."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

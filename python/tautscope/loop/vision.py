@@ -3,8 +3,6 @@
 Pixel coordinates are OpenCV's: u to the right, v down, the centre of the first pixel is (0, 0).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The clocks of a node: monotonic for control, wall clock for the stamps of messages."""
 
-from __future__ import annotations
-
 import time
 
 

@@ -1,7 +1,5 @@
 """The control process of the node: requests, rig, loop, telemetry; one thread, no lock."""
 
-from __future__ import annotations
-
 import dataclasses
 import logging
 import time

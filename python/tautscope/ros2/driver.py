@@ -1,7 +1,5 @@
 """A rig whose drives, and the camera if it has one, are nodes of ROS."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np

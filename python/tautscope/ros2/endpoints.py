@@ -4,8 +4,6 @@ Nothing here calls back: messages wait in channels of Zenoh, outside Python, unt
 A control loop that takes them is never interrupted by one.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 An error names the topic and the field; the message then changes nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

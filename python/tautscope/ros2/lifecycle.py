@@ -1,7 +1,5 @@
 """States and transitions of a managed node, as lifecycle_msgs and design.ros2.org define them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """Messages of ROS 2 as measurements of the tip; without ROS, for every node."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Messages that the node publishes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Parameters of the node: the share of the compensation, and settings that can only be read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Sources of the operator's reference: ``servo_jp``, and ``sensor_msgs/Joy``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

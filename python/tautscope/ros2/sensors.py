@@ -1,7 +1,5 @@
 """Sensors of the tip that are nodes of ROS."""
 
-from __future__ import annotations
-
 from tautscope.config import Config
 from tautscope.errors import MessageError
 from tautscope.loop.measurement import Measurement

@@ -1,11 +1,9 @@
 """A node of ROS 2 in a Zenoh session."""
 
-from __future__ import annotations
-
 import json
 import re
 from ipaddress import ip_address
-from typing import Any
+from typing import Any, Self
 
 import zenoh
 
@@ -142,7 +140,7 @@ class Node:
         """Leave the network; the process cannot end before."""
         self._session.close()  # type: ignore[no-untyped-call]
 
-    def __enter__(self) -> Node:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

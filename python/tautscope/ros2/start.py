@@ -1,7 +1,5 @@
 """Start of the node ``tautscope ros2``."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from pathlib import Path

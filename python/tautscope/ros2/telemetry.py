@@ -1,7 +1,5 @@
 """What the node publishes about rig, loop and itself."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import Future
 

@@ -1,7 +1,5 @@
 """ROS 2 types beside those of logs: definitions of `crtk_msgs` and of services, and type hashes."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -5,8 +5,6 @@ From the design document of rmw_zenoh (ros2/rmw_zenoh, docs/design.md). A topic 
 them visible to `ros2 node list` and `ros2 topic list`. Every message has an attachment.
 """
 
-from __future__ import annotations
-
 import hashlib
 import struct
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What columns a table has, and which of them may be a command and its tip."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """The ticks of the loop on a rig: the only place with a loop and a clock."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -34,19 +32,15 @@ class Log(Protocol):
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
     ) -> None:
         """A control tick; `made_at` is when its reference was made [s, the rig's clock]."""
-        ...
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """An image update at time `now` [s, the rig's clock]."""
-        ...
 
     def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
         """An update by another sensor at time `now` [s, the rig's clock]."""
-        ...
 
     def event(self, now: float, what: str) -> None:
         """A call of the operator or the rig, as `HysteresisReduction.on_event`, at time `now`."""
-        ...
 
 
 class Monitor(Protocol):
@@ -57,11 +51,9 @@ class Monitor(Protocol):
 
     def add_sample(self, time: float, applied: Floats) -> None:
         """Add a sample of the rig."""
-        ...
 
     def check_frame(self, captured_at: float, report: Report) -> None:
         """Compare an image update with the samples."""
-        ...
 
 
 class ControlLoop:

@@ -5,8 +5,6 @@ rows, with the number of the episode in each: one file per episode up to v2.1, s
 since v3.0. Videos are not read. Source: github.com/huggingface/lerobot.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

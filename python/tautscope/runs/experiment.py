@@ -1,7 +1,5 @@
 """Runs of a reference on a rig."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Executor
 

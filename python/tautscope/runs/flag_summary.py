@@ -1,7 +1,5 @@
 """Summary of the flags raised in a run, as sentences: meaning, number of updates, reaction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

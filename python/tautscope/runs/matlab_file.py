@@ -1,7 +1,5 @@
 """A program: a .mat file on its standard input becomes a .npz file on its standard output."""
 
-from __future__ import annotations
-
 import io
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Output folders that appear complete or not at all, and what an interrupted run leaves."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shutil

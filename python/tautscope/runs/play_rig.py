@@ -1,7 +1,5 @@
 """A simulated robot of plays, to try a configuration before the motors move."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses to an axis: the turn of a quaternion, and the travel of a point, as one number."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

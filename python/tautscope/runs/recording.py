@@ -1,14 +1,12 @@
 """The recording of a run: every tick, every frame, and the configuration."""
 
-from __future__ import annotations
-
 import csv
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,7 +162,7 @@ class Recording:
         (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
 
     @classmethod
-    def load(cls, folder: str | PathLike[str], suffix: str = "") -> Recording:
+    def load(cls, folder: str | PathLike[str], suffix: str = "") -> Self:
         """Read what `save` wrote; equal to the last bit, without snapshot and warnings.
 
         Raises:

@@ -1,7 +1,5 @@
 """The hysteresis estimator applied to a record, sample by sample."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

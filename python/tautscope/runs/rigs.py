@@ -1,7 +1,5 @@
 """Rigs of the user, by name."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable

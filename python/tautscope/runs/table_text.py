@@ -1,7 +1,5 @@
 """A table as text: where it begins, its delimiter, titles and units, recognised by its head."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import re

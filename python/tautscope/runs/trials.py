@@ -1,7 +1,5 @@
 """Parallel runs, each in its own process."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Units of recorded columns."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

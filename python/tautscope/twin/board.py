@@ -1,7 +1,5 @@
 """A simulated calibration board, as the twin's camera sees it."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -4,8 +4,6 @@ It uses neither bending angles nor the loop's camera model: the physics gives th
 `Renderer` (crates/render) has its own projection.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

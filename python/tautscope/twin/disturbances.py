@@ -20,8 +20,6 @@ changes them; the centroid of a visible part counts as measurement error. Distur
 reduce the visible share; smoke, blur, exposure and colour do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """A simulated rig that differs from its configuration, as a rig does before it is calibrated."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2

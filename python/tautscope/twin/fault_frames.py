@@ -3,8 +3,6 @@
 Frames are not changed in place, and their ground truth stays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

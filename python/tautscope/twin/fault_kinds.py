@@ -4,8 +4,6 @@ For every sensor, actuator and input there are the failure modes that apply to i
 garbage, wrong, slow, delayed, intermittent. ``ok`` is the run without a fault, for comparison.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import StrEnum

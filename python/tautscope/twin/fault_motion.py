@@ -3,8 +3,6 @@
 A model of an axis maps the value of one DOF [m or rad] to the faulty value.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 

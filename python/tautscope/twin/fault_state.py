@@ -1,11 +1,9 @@
 """The state of one injected fault during a run, common to all fault models."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +36,7 @@ class FaultState:
     stalls: int = 0
 
     @classmethod
-    def seeded(cls, spec: Fault, seed: int, index: int, **context: Any) -> FaultState:
+    def seeded(cls, spec: Fault, seed: int, index: int, **context: Any) -> Self:
         """The fault at place ``index`` of a list, with the random generator of a seed."""
         rng = np.random.default_rng([seed, index, zlib.crc32(spec.kind.encode())])
         return cls(spec, rng, **context)

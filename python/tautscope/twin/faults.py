@@ -1,7 +1,5 @@
 """Fault injection into the simulated rig and into the operator's reference, seeded."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

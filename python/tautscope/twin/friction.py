@@ -1,7 +1,5 @@
 """Friction that varies with position, time and speed."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

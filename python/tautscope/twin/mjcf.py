@@ -12,8 +12,6 @@ Section: a chain of hinges. Two cables run from a drum to the distal end of the 
 of lumped masses with sheath friction, joined by springs that only pull.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

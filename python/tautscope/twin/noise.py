@@ -1,7 +1,5 @@
 """Seeded random values and textures that change smoothly from frame to frame (value noise)."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import dataclass
 from functools import lru_cache

@@ -4,8 +4,6 @@ Images are the light before the sensor: float32 (height, width, 3), BGR, in grey
 undisturbed exposure, not clipped at 255.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

@@ -3,8 +3,6 @@
 Images are as in `tautscope.twin.obstacles`.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

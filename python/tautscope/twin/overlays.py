@@ -3,8 +3,6 @@
 Images are uint8 (height, width, 3), BGR. Layout and colours are those of real colonoscopy images.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

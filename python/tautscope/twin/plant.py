@@ -1,7 +1,5 @@
 """The simulated plant: drives, shaft, cables and bending section in MuJoCo."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Motion of the marker bands in the image, from the plant's centreline and OpenCV's projection."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

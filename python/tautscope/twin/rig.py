@@ -1,7 +1,5 @@
 """The simulated rig: plant and camera behind the `Rig` interface."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

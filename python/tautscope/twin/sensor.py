@@ -1,7 +1,5 @@
 """Automatic exposure and compression of the camera's images, and the rows of a rolling shutter."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

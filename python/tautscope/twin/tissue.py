@@ -1,7 +1,5 @@
 """Background of the simulated images: procedural mucosa, or images of a folder."""
 
-from __future__ import annotations
-
 from os import PathLike
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The path from the motors to the proximal ends of shaft and cables: gain, slack and lag."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Friction with presliding: Dahl's model, for one axis and for two axes that share a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

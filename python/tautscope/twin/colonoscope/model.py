@@ -16,8 +16,6 @@ move with the base, so that insertion does not pull a cable.
 Friction is not in this file: `tautscope.twin.colonoscope.plant` applies it as forces.
 """
 
-from __future__ import annotations
-
 import math
 
 from tautscope.twin.colonoscope.parameters import SEGMENTS, ColonoscopeParameters

@@ -1,7 +1,5 @@
 """The simulated colonoscope tip: drives, cables with friction, shaft and section in MuJoCo."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

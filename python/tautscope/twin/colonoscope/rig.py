@@ -1,7 +1,5 @@
 """The simulated colonoscope behind the `Rig` interface."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

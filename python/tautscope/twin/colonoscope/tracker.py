@@ -1,7 +1,5 @@
 """The simulated electromagnetic (EM) tracker of the tip: rate, delay, noise and drift."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import cv2
