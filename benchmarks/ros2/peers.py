@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.ros2 import messages
-from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import MakeRig, NodeControl
 from tautscope.ros2.endpoints import IMAGE, Subscription
 from tautscope.ros2.inputs import JoyAxes
-from tautscope.ros2.session import SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Clock, Node
 from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]

@@ -1,7 +1,5 @@
 """A node under test on a stepped clock, and another node."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

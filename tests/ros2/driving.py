@@ -1,7 +1,5 @@
 """Ticks of a node under test, with a stream of references or without."""
 
-from __future__ import annotations
-
 import numpy as np
 from ros2.peers import Peers
 

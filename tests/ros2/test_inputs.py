@@ -1,7 +1,5 @@
 """Received messages are checked; an error names topic and field."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Messages of sensors as measurements; an error names topic and field."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The node: states, the bits of its commands, and what it publishes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

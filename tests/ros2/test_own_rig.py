@@ -1,7 +1,5 @@
 """The node with a rig of one's own: a stop during its reset, which may move motors."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 `benchmarks/ros2` builds the client, which takes more than ten minutes, and measures the round trip.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

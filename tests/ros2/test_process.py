@@ -1,7 +1,5 @@
 """The command, as processes: a driver stops when the node is killed; exits are clean."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """References of the node: clutching, silence, a second publisher, refusals, a gamepad."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

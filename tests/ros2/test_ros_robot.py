@@ -1,7 +1,5 @@
 """The node of a robot with [[dof]]: measurements by topics in place of images."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from collections.abc import Callable

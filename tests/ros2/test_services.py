@@ -1,7 +1,5 @@
 """Services of the node: lifecycle, parameters, and any bytes."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

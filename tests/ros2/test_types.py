@@ -1,7 +1,5 @@
 """Types, hashes and CDR against independent implementations."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

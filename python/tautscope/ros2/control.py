@@ -17,14 +17,13 @@ from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, State
 from tautscope.loop.rig import Frame, Rig, disable, reset_unless
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
-from tautscope.ros2.clock import Clock
 from tautscope.ros2.driver import DriverRig
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
 from tautscope.ros2.parameters import Parameters
 from tautscope.ros2.references import JoyReference, ServoReference
 from tautscope.ros2.sensors import Sensors
-from tautscope.ros2.session import Node
+from tautscope.ros2.session import Clock, Node
 from tautscope.ros2.telemetry import Telemetry
 from tautscope.ros2.wire import Qos
 
@@ -38,16 +37,9 @@ MakeRig = Callable[[Config], Rig]
 class NodeControl:
     """Runs the loop by the requests to a node.
 
-    Args:
-        config: Of the loop.
-        node: The node.
-        folder: For logs.
-        executor: Runs the marker detection.
-        clock: The clocks.
-        make_rig: Makes the rig, in the transition ``configure``; None for a driver in ROS.
-        device: Topic of the reference, ``servo_jp`` or ``joy``.
-        layout: Axes and button of a gamepad.
-        on_result: Called at the end of a run with a line about what the compensation achieved.
+    `make_rig` is called in the transition ``configure``; it is None for a driver in ROS. `device`
+    is the topic of the reference, ``servo_jp`` or ``joy``. `on_result` is called at the end of a
+    run with a line about what the compensation achieved.
 
     Attributes:
         run: The present run; None if the node is not active.
@@ -131,7 +123,10 @@ class NodeControl:
                 self._fail(f"{supervision.reaction}: {', '.join(supervision.flags)}")
                 return
             run.step()
-            self._add_measurements(run)
+            sample = run.sample
+            if found := self._sensors.take(sample.time):
+                measured = (*sample.measurements, *found)
+                run.sample = dataclasses.replace(sample, measurement=measured)
         except TautscopeError as error:
             self._fail(described(error))
 
@@ -209,9 +204,6 @@ class NodeControl:
             return not is_start
         return True
 
-    def _is_stopped(self) -> bool:
-        return self._take_command() in ("disable", "pause")
-
     def _release_rig(self) -> None:
         rig, self._rig = self._rig, None
         if rig is not None:
@@ -224,7 +216,7 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
-        sample = reset_unless(rig, self._is_stopped)
+        sample = reset_unless(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
@@ -240,13 +232,6 @@ class NodeControl:
         run.set_compensation(float(self.parameters["compensation"]))
         self.run = run
         self._states.accept("enable", self._reaction)
-
-    def _add_measurements(self, run: ControlRun) -> None:
-        """Add what sensors in ROS have measured to the sample for the next tick."""
-        sample = run.sample
-        if found := self._sensors.take(sample.time):
-            measured = (*sample.measurements, *found)
-            run.sample = dataclasses.replace(sample, measurement=measured)
 
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""

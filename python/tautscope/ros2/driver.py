@@ -1,6 +1,7 @@
 """A rig whose drives, and the camera if it has one, are nodes of ROS."""
 
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,11 +11,9 @@ from tautscope.errors import DriveError, MessageError
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.signal_checks import check_signal
 from tautscope.ros2 import messages
-from tautscope.ros2.clock import Clock
-from tautscope.ros2.endpoints import IMAGE, Subscription
+from tautscope.ros2.endpoints import IMAGE, Refuse, Subscription
 from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
-from tautscope.ros2.references import Refuse
-from tautscope.ros2.session import SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Clock, Node
 
 DRIVER_TIMEOUT = 0.1
 """Longest time without positions from the driver [s]."""
@@ -31,15 +30,6 @@ class DriverRig:
     Implements `tautscope.loop.rig.Rig`. Its clock is the monotonic one, from `reset` on; a stamp is
     converted by its age. The first command should be the applied position of the first sample.
     After `close`, and if this process ends, no set-point is sent, by which the driver has to stop.
-
-    Args:
-        config: With the degrees of freedom; without [[dof]] with the camera's size and format.
-        node: Publishes and subscribes.
-        clock: The clocks.
-        refuse: Called for refused messages.
-
-    Attributes:
-        control_period: Time from one command to the next [s].
     """
 
     def __init__(self, config: Config, node: Node, clock: Clock, refuse: Refuse) -> None:
@@ -60,11 +50,7 @@ class DriverRig:
         self._start = self._due = self._moved_at = self._frames = 0
 
     def reset(self) -> Sample:
-        """Wait for new positions of the driver; the clock is at 0.
-
-        Raises:
-            DriveError: There are none.
-        """
+        """Wait for new positions of the driver, else a `DriveError`; the clock is at 0."""
         with suppress(MessageError):
             self._positions.take()  # one from before, of any age
         self._applied = None
@@ -109,31 +95,25 @@ class DriverRig:
         return Sample(now, self._applied, self._newest_frame())
 
     def _newest_position(self) -> NDArray[np.float64] | None:
-        try:
-            message = self._positions.take()
-            if message is not None:
-                applied = joint_positions(self._positions.topic, message, self._joints)
-                wall, source = self._clock.wall(), self._positions.source
-                self._position_stamps.check(message.header, wall, source)
-                self._applied, self._moved_at = applied, self._clock.monotonic()
-        except MessageError as error:
-            self._refuse(error)
+        self._positions.read(self._set_position, self._refuse)
         return self._applied
 
+    def _set_position(self, message: Any) -> None:
+        applied = joint_positions(self._positions.topic, message, self._joints)
+        wall, source = self._clock.wall(), self._positions.source
+        self._position_stamps.check(message.header, wall, source)
+        self._applied, self._moved_at = applied, self._clock.monotonic()
+
     def _newest_frame(self) -> Frame | None:
-        try:
-            message = None if self._images is None else self._images.take()
-            if message is None:
-                return None
-            wall = self._clock.wall()
-            age = wall - self._image_stamps.check(message.header, wall)
-            captured_at = (self._clock.monotonic() - age - self._start) / 1e9
-            frame = self._reader.read(message, captured_at, self._frames)
-        except MessageError as error:
-            self._refuse(error)
-            return None
-        self._frames += 1
-        return frame
+        frames = [] if self._images is None else self._images.read(self._frame, self._refuse)
+        self._frames += len(frames)
+        return frames[0] if frames else None
+
+    def _frame(self, message: Any) -> Frame:
+        wall = self._clock.wall()
+        age = wall - self._image_stamps.check(message.header, wall)
+        captured_at = (self._clock.monotonic() - age - self._start) / 1e9
+        return self._reader.read(message, captured_at, self._frames)
 
     def _silent(self, time: float, remedy: str) -> DriveError:
         return DriveError(self._positions.topic, f"no message for {time:g} s", remedy)

@@ -6,7 +6,7 @@ A control loop that takes them is never interrupted by one.
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from tautscope.errors import MessageError
 from tautscope.ros2 import types, wire
@@ -16,6 +16,9 @@ LARGEST = 2**16
 """Longest message that is decoded, but for images [byte]: a tick must not wait for a longer one."""
 Handler = Callable[[Any], dict[str, Any]]
 """Makes the fields of the response to a request."""
+Refuse = Callable[[MessageError], None]
+"""Called with the reason for which a message is refused."""
+Read = TypeVar("Read")
 LARGEST_IMAGE = 2**26
 """Longest image that is decoded [byte]."""
 
@@ -23,9 +26,8 @@ LARGEST_IMAGE = 2**26
 class Publisher:
     """Publishes messages of one topic; made by `Node.publisher`."""
 
-    def __init__(self, kind: str, publisher: Any, token: Any, source: bytes) -> None:
-        self._kind, self._publisher = kind, publisher
-        self._token, self._source = token, source
+    def __init__(self, kind: str, publisher: Any, source: bytes) -> None:
+        self._kind, self._publisher, self._source = kind, publisher, source
         self._sequence = 0
 
     def publish(self, message: Any) -> None:
@@ -53,26 +55,19 @@ class Subscription:
     """The messages of one topic; made by `Node.subscription`.
 
     Attributes:
-        topic: Full name of the topic.
-        received: Number of messages taken.
         missed: Number of messages between these that were lost, or replaced by newer ones.
         source: Identifier of the publisher of the last message; empty if it has none.
     """
 
-    def __init__(self, topic: str, kind: str, subscriber: Any, token: Any) -> None:
-        self.topic, self._kind = topic, kind
+    def __init__(self, topic: str, kind: str, subscriber: Any) -> None:
+        self.topic, self._kind, self._subscriber = topic, kind, subscriber
         self._largest = LARGEST_IMAGE if kind == IMAGE else LARGEST
-        self._subscriber, self._token = subscriber, token
         self.received = self.missed = 0
         self.source = b""
         self._sequence = 0
 
     def take(self) -> Any | None:
-        """The oldest message that waits, or None.
-
-        Raises:
-            MessageError: It cannot be decoded.
-        """
+        """The oldest message that waits, or None; a `MessageError` if it cannot be decoded."""
         sample = self._subscriber.try_recv()
         if sample is None:
             return None
@@ -89,13 +84,24 @@ class Subscription:
         except MessageError as error:
             raise MessageError(self.topic, error.value, error.allowed) from None
 
+    def read(self, convert: Callable[[Any], Read], refuse: Refuse, most: int = 1) -> list[Read]:
+        """What the oldest messages that wait are converted to; the wrong ones are refused."""
+        found = []
+        for _ in range(most):
+            try:
+                if (message := self.take()) is None:
+                    break
+                found.append(convert(message))
+            except MessageError as error:
+                refuse(error)
+        return found
+
 
 class Service:
     """Requests to a service; made by `Node.service`."""
 
-    def __init__(self, kind: str, queryable: Any, token: Any, handler: Handler) -> None:
-        self._kind, self._queryable, self._token = kind, queryable, token
-        self._handler = handler
+    def __init__(self, kind: str, queryable: Any, handler: Handler) -> None:
+        self._kind, self._queryable, self._handler = kind, queryable, handler
 
     def serve(self) -> None:
         """Answer the requests that wait; one that cannot be decoded gets an error."""

@@ -31,11 +31,7 @@ ENCODINGS = {
 
 
 class Stamps:
-    """Checks that messages are of one publisher, and their stamps known, of the present, and later.
-
-    Args:
-        topic: The topic, for errors.
-    """
+    """Checks that messages are of one publisher, with stamps known, of the present, and later."""
 
     def __init__(self, topic: str) -> None:
         self._topic = topic
@@ -155,15 +151,7 @@ def joy_deflection(topic: str, message: Any, layout: JoyAxes) -> tuple[Floats, b
 
 
 class ImageReader:
-    """Converts sensor_msgs/msg/Image to frames of the configured camera.
-
-    Args:
-        topic: The topic, for errors.
-        camera: The camera; ``camera.pixel_format`` decides which encoding is taken.
-
-    Raises:
-        ConfigError: ROS has no encoding for the pixel format.
-    """
+    """Converts images of ROS to frames of the configured camera, if ROS has its pixel format."""
 
     def __init__(self, topic: str, camera: CameraConfig) -> None:
         self._topic, self._camera = topic, camera

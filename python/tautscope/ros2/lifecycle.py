@@ -1,6 +1,6 @@
 """States and transitions of a managed node, as lifecycle_msgs and design.ros2.org define them."""
 
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -50,12 +50,7 @@ Change = Callable[[Transition], bool]
 
 
 class Lifecycle:
-    """The state of a node, and the services by which it is read and changed.
-
-    Args:
-        node: Has the services.
-        change: Carries a transition out.
-    """
+    """The state of a node, and the services by which it is read and changed."""
 
     def __init__(self, node: Node, change: Change) -> None:
         self.state = State.UNCONFIGURED
@@ -66,12 +61,12 @@ class Lifecycle:
             ("change_state", "ChangeState", self._change_state),
             ("get_state", "GetState", lambda _: {"current_state": _state(self.state)}),
             ("get_available_states", "GetAvailableStates", lambda _: states),
-            ("get_available_transitions", "GetAvailableTransitions", self._get_transitions),
             (
-                "get_transition_graph",
+                "get_available_transitions",
                 "GetAvailableTransitions",
-                lambda _: _descriptions(list(State)),
+                lambda _: _descriptions(self.state),
             ),
+            ("get_transition_graph", "GetAvailableTransitions", lambda _: _descriptions(*State)),
         ):
             node.add_service(f"~/{name}", f"lifecycle_msgs/srv/{kind}", handler)
 
@@ -94,11 +89,8 @@ class Lifecycle:
         ]
         return {"success": bool(found) and self.trigger(found[0])}
 
-    def _get_transitions(self, _: Any) -> dict[str, Any]:
-        return _descriptions([self.state])
 
-
-def _descriptions(starts: Container[State]) -> dict[str, Any]:
+def _descriptions(*starts: State) -> dict[str, Any]:
     """The transitions from some states."""
     found = [_description(each) for each in TRANSITIONS if each.start in starts]
     return {"available_transitions": found}

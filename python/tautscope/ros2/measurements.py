@@ -22,13 +22,7 @@ KINDS = {
 
 
 class MeasurementReader:
-    """Reads the messages of one of `measurement.topics`.
-
-    Args:
-        config: With degrees of freedom and topics.
-        sensor: Index of the topic, which is the number of the sensor.
-        topic: Full name of the topic, for errors.
-    """
+    """Reads the messages of one of `measurement.topics`, whose index is that of the sensor."""
 
     def __init__(self, config: Config, sensor: int, topic: str) -> None:
         self._settings: TopicConfig = config.measurement.topics[sensor]

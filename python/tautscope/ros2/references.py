@@ -1,6 +1,7 @@
 """Sources of the operator's reference: ``servo_jp``, and ``sensor_msgs/Joy``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +12,14 @@ from tautscope.console.messages import Command, Received, Servo
 from tautscope.console.operator_input import DEAD_BAND, OperatorInput
 from tautscope.errors import MessageError
 from tautscope.loop.operating_state import OperatingState, StateMachine
-from tautscope.ros2.clock import Clock
+from tautscope.ros2.endpoints import Refuse
 from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
-from tautscope.ros2.session import Node
+from tautscope.ros2.session import Clock, Node
 from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]
 QUEUE = 10
 """Number of references that wait for a tick; it takes the newest."""
-Refuse = Callable[[MessageError], None]
-"""Called with the reason for which a message is refused."""
 
 
 class ServoReference:
@@ -35,13 +34,6 @@ class ServoReference:
     remains, and its age grows, by which the loop detects a silent device
     (``safety.reference_age``). While motion is held, by the supervisor or by request, the reference
     rests.
-
-    Args:
-        node: Subscribes.
-        joints: Names of the degrees of freedom.
-        clock: Clock of the stamps.
-        refuse: Called for refused messages.
-        states: Has what was requested.
     """
 
     def __init__(
@@ -91,19 +83,12 @@ class ServoReference:
 
     def _take(self) -> list[tuple[Floats, int]]:
         """Position and stamp of the valid messages that wait."""
-        found = []
-        for _ in range(QUEUE):
-            try:
-                message = self._messages.take()
-                if message is None:
-                    break
-                position = joint_positions(self._messages.topic, message, self._joints)
-                source = self._messages.source
-                stamp = self._stamps.check(message.header, self._clock.wall(), source)
-                found.append((position, stamp))
-            except MessageError as error:
-                self._refuse(error)
-        return found
+        return self._messages.read(self._position, self._refuse, QUEUE)
+
+    def _position(self, message: Any) -> tuple[Floats, int]:
+        position = joint_positions(self._messages.topic, message, self._joints)
+        source = self._messages.source
+        return position, self._stamps.check(message.header, self._clock.wall(), source)
 
 
 class JoyReference:
@@ -111,14 +96,6 @@ class JoyReference:
 
     Speed, ramp, travel, and rest without messages are those of the operator's console,
     `tautscope.console.operator_input.OperatorInput`.
-
-    Args:
-        config: Limits of speed and travel.
-        node: Subscribes.
-        layout: Axes and button.
-        clock: Clock of the stamps.
-        refuse: Called for refused messages.
-        states: Has what was requested.
     """
 
     age: float | None = None
@@ -155,23 +132,20 @@ class JoyReference:
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The reference (n,) [m or rad] of a tick at a time of the monotonic clock [s]."""
-        try:
-            message = self._messages.take()
-            if message is not None:
-                deflection, is_holding = joy_deflection(self._messages.topic, message, self._layout)
-                wall = self._clock.wall()
-                stamp = self._stamps.check(message.header, wall, self._messages.source)
-                age = (wall - stamp) / 1e9
-                axes = tuple(deflection.tolist())
-                servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
-                self._operator.receive(Received(0, now - age, servo), now)
-                if self._operator.is_off_centre:
-                    allowed = f"each at most {DEAD_BAND} once, at rest; else --axes names a trigger"
-                    raise MessageError(f"{self._messages.topic} axes", axes, allowed)
-        except MessageError as error:
-            self._refuse(error)
+        self._messages.read(lambda message: self._receive(message, now), self._refuse)
         is_held = is_held or self._states.goal is OperatingState.PAUSED
         return self._operator.update(now, period, command, is_held=is_held)
+
+    def _receive(self, message: Any, now: float) -> None:
+        deflection, is_holding = joy_deflection(self._messages.topic, message, self._layout)
+        wall = self._clock.wall()
+        age = (wall - self._stamps.check(message.header, wall, self._messages.source)) / 1e9
+        axes = tuple(deflection.tolist())
+        servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
+        self._operator.receive(Received(0, now - age, servo), now)
+        if self._operator.is_off_centre:
+            allowed = f"each at most {DEAD_BAND} once, at rest; else --axes names a trigger"
+            raise MessageError(f"{self._messages.topic} axes", axes, allowed)
 
 
 class _OneOperator(Lease):

@@ -1,13 +1,14 @@
 """Sensors of the tip that are nodes of ROS."""
 
+from functools import partial
+from typing import Any
+
 from tautscope.config import Config
-from tautscope.errors import MessageError
 from tautscope.loop.measurement import Measurement
-from tautscope.ros2.clock import Clock
+from tautscope.ros2.endpoints import Refuse
 from tautscope.ros2.inputs import checked_stamp
 from tautscope.ros2.measurements import KINDS, MeasurementReader
-from tautscope.ros2.references import Refuse
-from tautscope.ros2.session import Node
+from tautscope.ros2.session import Clock, Node
 from tautscope.ros2.wire import Qos
 
 QUEUE = 10
@@ -19,12 +20,6 @@ class Sensors:
 
     A stamp is converted to the rig's clock by its age. What is late, repeated or out of order is
     left to the loop.
-
-    Args:
-        config: With topics.
-        node: Subscribes.
-        clock: Clock of the stamps.
-        refuse: Called for refused messages.
     """
 
     def __init__(self, config: Config, node: Node, clock: Clock, refuse: Refuse) -> None:
@@ -45,21 +40,18 @@ class Sensors:
 
     def take(self, now: float) -> tuple[Measurement, ...]:
         """What has arrived since the last call, at a time of the rig's clock [s]."""
-        found = []
+        found: list[Measurement] = []
         for topic, reader in zip(self._topics, self._readers, strict=True):
-            for _ in range(QUEUE):
-                try:
-                    message = topic.take()
-                    if message is None:
-                        break
-                    wall = self._clock.wall()
-                    age = wall - checked_stamp(topic.topic, message.header, wall)
-                    measurement = reader.read(message, now - age / 1e9)
-                    if measurement is not None:
-                        found.append(measurement)
-                except MessageError as error:
-                    self._refuse(error)
+            convert = partial(self._measurement, topic.topic, reader, now)
+            found += [each for each in topic.read(convert, self._refuse, QUEUE) if each is not None]
         return tuple(found)
+
+    def _measurement(
+        self, topic: str, reader: MeasurementReader, now: float, message: Any
+    ) -> Measurement | None:
+        wall = self._clock.wall()
+        age = wall - checked_stamp(topic, message.header, wall)
+        return reader.read(message, now - age / 1e9)
 
     def _make_readers(self) -> None:
         self._readers = [

@@ -1,9 +1,10 @@
-"""A node of ROS 2 in a Zenoh session."""
+"""A node of ROS 2 in a Zenoh session, and its clocks."""
 
 import json
 import re
+import time
 from ipaddress import ip_address
-from typing import Any, Self
+from typing import Self
 
 import zenoh
 
@@ -27,6 +28,22 @@ _LOOPBACK = "tcp/127.0.0.1:0"
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
+class Clock:
+    """The clocks of a node [ns]: monotonic for control, wall clock for stamps."""
+
+    def monotonic(self) -> int:
+        """The monotonic clock [ns]; it is never set."""
+        return time.monotonic_ns()
+
+    def wall(self) -> int:
+        """The wall clock [ns since 1970], which stamps are of."""
+        return time.time_ns()
+
+    def sleep_until(self, instant: int) -> None:
+        """Wait until a time of the monotonic clock [ns]."""
+        time.sleep(max(0.0, (instant - time.monotonic_ns()) / 1e9))
+
+
 class Node:
     """A node of ROS 2; a context manager.
 
@@ -41,10 +58,6 @@ class Node:
         listen: Own endpoint, on the loopback interface.
         is_blocking: Whether a publisher waits while the transport is busy, and drops no message;
             for comparisons.
-
-    Attributes:
-        identity: The node in the network.
-        subscriptions: All subscriptions.
 
     Raises:
         ConfigError: A name, the domain or an endpoint is not valid, or not free.
@@ -87,43 +100,42 @@ class Node:
             endpoints = f"connect {connect}, listen {listen}"
             raise ConfigError("endpoint", endpoints, f"as tcp/127.0.0.1:7447 ({error})") from None
         self.identity = wire.Identity(domain, str(self._session.info.zid()), namespace, name)
-        self._tokens = [self._declare(self.identity.node_token())]
+        self._tokens = [self._session.liveliness().declare_token(self.identity.node_token())]
         self._congestion = (
             zenoh.CongestionControl.BLOCK if is_blocking else zenoh.CongestionControl.DROP
         )
         self._has_hashes = distribution != HUMBLE
-        self._entities = 0
         self.subscriptions: list[Subscription] = []
         self._services: list[Service] = []
 
     def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
         """A publisher of messages of a type."""
-        token, name = self._announce(Entity.PUBLISHER, topic, kind, qos)
+        key, token = self._announce(Entity.PUBLISHER, topic, kind, qos)
         # An image fills the queue of its priority: set-points must not be dropped behind it.
         publisher = self._session.declare_publisher(
-            self._key(topic, kind),
+            key,
             reliability=_RELIABILITY[qos.is_reliable],
             priority=_PRIORITY[qos.is_reliable],
             congestion_control=self._congestion,
             express=True,
         )
-        return Publisher(kind, publisher, token, wire.gid(name))
+        return Publisher(kind, publisher, wire.gid(token))
 
     def subscription(self, topic: str, kind: str, qos: Qos = NEWEST) -> Subscription:
         """A subscription that keeps the newest `qos.depth` messages."""
-        token, _ = self._announce(Entity.SUBSCRIPTION, topic, kind, qos)
+        key, _ = self._announce(Entity.SUBSCRIPTION, topic, kind, qos)
         channel: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(qos.depth)
-        subscriber = self._session.declare_subscriber(self._key(topic, kind), channel)
-        subscription = Subscription(self.resolve(topic), kind, subscriber, token)
+        subscriber = self._session.declare_subscriber(key, channel)
+        subscription = Subscription(self.resolve(topic), kind, subscriber)
         self.subscriptions.append(subscription)
         return subscription
 
     def add_service(self, name: str, kind: str, handler: Handler) -> None:
         """Offer a service; `handler` makes the fields of the response to a request."""
-        token, _ = self._announce(Entity.SERVICE, name, kind, Qos())
+        key, _ = self._announce(Entity.SERVICE, name, kind, Qos())
         channel: zenoh.handlers.FifoChannel[zenoh.Query] = zenoh.handlers.FifoChannel(16)
-        queryable = self._session.declare_queryable(self._key(name, kind), channel, complete=True)
-        self._services.append(Service(kind, queryable, token, handler))
+        queryable = self._session.declare_queryable(key, channel, complete=True)
+        self._services.append(Service(kind, queryable, handler))
 
     def serve(self) -> None:
         """Answer the requests that wait at the services."""
@@ -146,34 +158,16 @@ class Node:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _key(self, topic: str, kind: str) -> str:
-        return wire.key(self.identity.domain, self.resolve(topic), kind, self._hash(kind))
-
-    def _hash(self, kind: str) -> str:
-        return types.type_hash(kind) if self._has_hashes else NO_HASH
-
-    def _announce(self, entity: Entity, topic: str, kind: str, qos: Qos) -> tuple[Any, str]:
-        self._entities += 1
-        name = self.identity.token(
-            self._entities,
-            entity,
-            self.resolve(topic),
-            kind=kind,
-            rihs=self._hash(kind),
-            qos=qos,
-        )
-        return self._declare(name), name
-
-    def _declare(self, token: str) -> Any:
-        return self._session.liveliness().declare_token(token)
+    def _announce(self, entity: Entity, topic: str, kind: str, qos: Qos) -> tuple[str, str]:
+        """Key of a topic or service, and the token by which it is visible."""
+        topic, rihs = self.resolve(topic), types.type_hash(kind) if self._has_hashes else NO_HASH
+        token = self.identity.token(len(self._tokens), entity, topic, kind=kind, rihs=rihs, qos=qos)
+        self._tokens.append(self._session.liveliness().declare_token(token))
+        return wire.key(self.identity.domain, topic, kind, rihs), token
 
 
 def check_loopback(endpoint: str) -> None:
-    """Check that nobody outside of this computer can connect to an endpoint.
-
-    Raises:
-        ConfigError: It is not on the loopback interface.
-    """
+    """Refuse an endpoint to which others than this computer connect, with a `ConfigError`."""
     host = endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
     try:
         is_loopback = host == "localhost" or ip_address(host).is_loopback

@@ -16,9 +16,8 @@ from tautscope.hardware.realtime import (
 )
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import defer_signals, exit_on_signals
-from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import MakeRig, NodeControl
-from tautscope.ros2.session import Node
+from tautscope.ros2.session import Clock, Node
 
 _LOG = logging.getLogger(__name__)
 NAME = "tautscope"
@@ -36,15 +35,8 @@ def start_node(
 ) -> int:
     """Run the node until it is finalized, or a signal; the exit status.
 
-    The motors are quick-stopped and the log is closed on every exit.
-
-    Args:
-        config: Settings.
-        node: The node; the caller closes it.
-        folder: New; for logs.
-        announce: Called with the name of the node when it is ready.
-        make_rig: As of `tautscope.ros2.control.NodeControl`.
-        **options: As of `NodeControl`.
+    The motors are quick-stopped and the log is closed on every exit. The caller closes the node;
+    `announce` is called with its name when it is ready. The options are those of `NodeControl`.
 
     Raises:
         ConfigError: The configuration does not describe a rig; as `NodeControl`.

@@ -13,9 +13,8 @@ from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
-from tautscope.ros2.clock import Clock
 from tautscope.ros2.endpoints import IMAGE, Publisher
-from tautscope.ros2.session import SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Clock, Node
 
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostic_msgs/msg/DiagnosticStatus."""
@@ -26,17 +25,7 @@ DIAGNOSTICS_PERIOD = 1_000_000_000
 
 
 class Telemetry:
-    """Publishes ticks, image updates, state, warnings and diagnostics.
-
-    Args:
-        config: Of the loop.
-        node: Publishes.
-        clock: The clocks.
-        has_rig: Whether drives and camera are this process's, and not nodes of their own.
-
-    Attributes:
-        refused: Field -> number of refused messages.
-    """
+    """Publishes ticks, updates, state, warnings, diagnostics; with a rig, its drives and images."""
 
     def __init__(self, config: Config, node: Node, clock: Clock, *, has_rig: bool) -> None:
         self._config, self._clock, self._has_rig = config, clock, has_rig

@@ -91,11 +91,7 @@ def type_hash(kind: str) -> str:
 
 
 def decode(kind: str, data: bytes) -> Any:
-    """A message of a type from CDR.
-
-    Raises:
-        MessageError: The bytes are not little-endian CDR of this type.
-    """
+    """A message of a type from little-endian CDR; else a `MessageError`."""
     try:
         return cdr.decode(kind, data)
     except RecordError as error:

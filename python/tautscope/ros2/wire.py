@@ -31,12 +31,7 @@ class Entity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """Quality of service of a topic; volatile, keep last.
-
-    Attributes:
-        depth: Number of messages kept.
-        is_reliable: Whether lost messages are sent again.
-    """
+    """Quality of service of a topic; volatile, keep last."""
 
     depth: int = 10
     is_reliable: bool = True
@@ -48,14 +43,7 @@ class Qos:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A node in the network.
-
-    Attributes:
-        domain: ROS_DOMAIN_ID.
-        session: Zenoh's identifier of the session.
-        namespace: Empty, or beginning with a slash.
-        name: Name of the node.
-    """
+    """A node in the network; its namespace is empty, or begins with a slash."""
 
     domain: int
     session: str
@@ -107,11 +95,7 @@ def attachment(sequence: int, sent_at: int, source: bytes) -> bytes:
 
 
 def read_attachment(data: bytes) -> tuple[int, int, bytes]:
-    """Number, wall clock time [ns] and source of a message.
-
-    Raises:
-        MessageError: It is no attachment of rmw_zenoh.
-    """
+    """Number, wall clock time [ns] and source of a message of rmw_zenoh; else a `MessageError`."""
     try:
         sequence, sent_at, size, source = _ATTACHMENT.unpack(data)
         if size != _GID_SIZE:
