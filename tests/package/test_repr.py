@@ -22,7 +22,7 @@ from tautscope.loop.vision import MarkerDetector
 from tautscope.metrics import loop_width
 from tautscope.runs.recording import Recording
 
-NAMES = {name: getattr(config, name) for name in config.__all__}
+NAMES = vars(config)
 LONGEST = 200
 """A line or two of a terminal."""
 

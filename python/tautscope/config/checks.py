@@ -36,13 +36,11 @@ def check_references(
         )
     for dof, noise in zip(Dof, safety.state_noise, strict=True):
         tolerance = dofs[dof].contact_tolerance * dofs[dof].update_distance
-        require(
-            0 <= 3 * noise < tolerance,
-            f"safety.state_noise[{dof}]",
-            noise,
+        allowed = (
             f"less than a third of {dof.label}.contact_tolerance times "
-            f"{dof.label}.update_distance = {tolerance:.3g}",
+            f"{dof.label}.update_distance = {tolerance:.3g}"
         )
+        require(0 <= 3 * noise < tolerance, f"safety.state_noise[{dof}]", noise, allowed)
 
 
 _OF_THE_ARTICLE = (

@@ -18,12 +18,8 @@ class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     def _check(self) -> None:
         """The history has 1 to 1024 ticks."""
-        require(
-            1 <= self.history / self.period <= 1024,
-            "history",
-            self.history,
-            f"{self.period:g} to {1024 * self.period:g}, 1 to 1024 of control.period",
-        )
+        allowed = f"{self.period:g} to {1024 * self.period:g}, 1 to 1024 of control.period"
+        require(1 <= self.history / self.period <= 1024, "history", self.history, allowed)
 
 
 class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -30,18 +30,7 @@ _UNIT = re.compile(
 
 @dataclass(frozen=True)
 class Key:
-    """One key of a section.
-
-    Attributes:
-        name: Its name.
-        text: Meaning, from the docstring.
-        unit: Unit, from the brackets in the docstring; empty without one.
-        allowed: Type and range in words.
-        default: Default value; None without one.
-        is_required: Whether it must be given.
-        section: Type of the section that it is, else None.
-        is_list: Whether it is a list of sections.
-    """
+    """One key of a section; `section` is its type if it is a section, or a list of them."""
 
     name: str
     text: str

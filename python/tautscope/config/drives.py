@@ -194,44 +194,7 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             owner = taken.get(axis.node)
             require(owner is None, f"{path}.node", axis.node, f"not that of {owner}")
             taken[axis.node] = motor.label
-            require(axis.travel[0] < axis.travel[1], f"{path}.travel", axis.travel, LIMITS)
-            fastest = FASTEST * (axis.travel[1] - axis.travel[0])
-            allowed = f"at most {fastest:.3g}: {FASTEST:g} times the width of travel per s"
-            require(axis.speed_limit <= fastest, f"{path}.speed_limit", axis.speed_limit, allowed)
-            require(
-                max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,
-                f"{path}.counts_per_unit",
-                axis.counts_per_unit,
-                f"less than 2^31 counts from home = {axis.home} to both ends of travel = "
-                f"{axis.travel}",
-            )
-            require(
-                2.0 * axis.following_error <= axis.travel[1] - axis.travel[0],
-                f"{path}.following_error",
-                axis.following_error,
-                f"at most half of the width of travel = {axis.travel}",
-            )
-            require_at_most(path, axis, "following_window", "following_error")
-            if self.protocol in PORTS:
-                allowed = "one of " + ", ".join(models_of(self.protocol))
-                known = axis.model in models_of(self.protocol)
-                require(known, f"{path}.model", axis.model, allowed)
-                lower, upper = axis.stops or (-math.inf, math.inf)
-                inside = lower <= axis.travel[0] and axis.travel[1] <= upper
-                require(inside, f"{path}.travel", axis.travel, f"within stops = {axis.stops}")
-            else:
-                require_defaults(axis, path, _OF_SERVOS, "only servos use it")
-            if self.protocol in SERIAL_PORTS:
-                require_defaults(axis, path, ("eds",), "only CiA 402 drives use it")
-            if self.protocol == PROTOCOL:
-                allowed = f"an axis of the microcontroller, 1 to {MOST_AXES}"
-                require(axis.node <= MOST_AXES, f"{path}.node", axis.node, allowed)
-            require(
-                axis.speed_limit * self.cycle * axis.counts_per_unit >= 1,
-                f"{path}.counts_per_unit",
-                axis.counts_per_unit,
-                "at least one count per cycle at the speed limit; per m or rad, not mm or deg",
-            )
+            self._check_motor(axis, path)
         if self.protocol in SERIAL_PORTS:
             require_defaults(self, "", _OF_CIA_402, "only CiA 402 drives use it")
         else:
@@ -248,10 +211,36 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             require(0.001 <= value <= most and is_whole, name, value, allowed)
         reply, cycle = self.reply_timeout, self.cycle
         require(reply < cycle, "reply_timeout", reply, f"less than cycle = {cycle}")
-        least = 2 * max(self.heartbeat_period, cycle)
-        require(
-            self.heartbeat_timeout >= least,
-            "heartbeat_timeout",
-            self.heartbeat_timeout,
-            f"at least {least}: two heartbeats and two cycles",
-        )
+        least, timeout = 2 * max(self.heartbeat_period, cycle), self.heartbeat_timeout
+        allowed = f"at least {least}: two heartbeats and two cycles"
+        require(timeout >= least, "heartbeat_timeout", timeout, allowed)
+
+    def _check_motor(self, axis: AxisConfig, path: str) -> None:
+        def check(is_valid: bool, key: str, allowed: str) -> None:
+            require(is_valid, f"{path}.{key}", getattr(axis, key), allowed)
+
+        travel, counts, protocol = axis.travel, axis.counts_per_unit, self.protocol
+        width, farthest = travel[1] - travel[0], max(abs(end - axis.home) for end in travel)
+        check(width > 0, "travel", LIMITS)
+        fastest = f"at most {FASTEST * width:.3g}: {FASTEST:g} times the width of travel per s"
+        check(axis.speed_limit <= FASTEST * width, "speed_limit", fastest)
+        few = f"less than 2^31 counts from home = {axis.home} to both ends of travel = {travel}"
+        check(farthest * counts < 2**31, "counts_per_unit", few)
+        half = f"at most half of the width of travel = {travel}"
+        check(2.0 * axis.following_error <= width, "following_error", half)
+        require_at_most(path, axis, "following_window", "following_error")
+        if protocol in PORTS:
+            models = models_of(protocol)
+            check(axis.model in models, "model", "one of " + ", ".join(models))
+            lower, upper = axis.stops or (-math.inf, math.inf)
+            is_inside = lower <= travel[0] and travel[1] <= upper
+            check(is_inside, "travel", f"within stops = {axis.stops}")
+        else:
+            require_defaults(axis, path, _OF_SERVOS, "only servos use it")
+        if protocol in SERIAL_PORTS:
+            require_defaults(axis, path, ("eds",), "only CiA 402 drives use it")
+        if protocol == PROTOCOL:
+            axes = f"an axis of the microcontroller, 1 to {MOST_AXES}"
+            check(axis.node <= MOST_AXES, "node", axes)
+        many = "at least one count per cycle at the speed limit; per m or rad, not mm or deg"
+        check(axis.speed_limit * self.cycle * counts >= 1, "counts_per_unit", many)

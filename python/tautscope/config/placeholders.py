@@ -27,11 +27,7 @@ def placeholders(path: str | PathLike[str] | None) -> tuple[str, ...]:
 
 
 def refuse_placeholders(path: str | PathLike[str] | None) -> None:
-    """Refuse a configuration with placeholders.
-
-    Raises:
-        ConfigError: Names the keys.
-    """
+    """Refuse a configuration with placeholders, with a `ConfigError` that names them."""
     found = placeholders(path)
     if path is not None and found:
         allowed = f"your values, and lines without the word {MARK}"

@@ -126,11 +126,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 def check_config(config: Config) -> Config:
-    """The configuration, where it is one and not the name of a file.
-
-    Raises:
-        ConfigError: It is something else.
-    """
+    """The configuration; a `ConfigError` if it is something else, as the name of a file."""
     if not isinstance(config, Config):
         raise ConfigError("config", config, "a tautscope.Config, as load_config(path) returns it")
     return config

@@ -80,10 +80,7 @@ def require_at_most(path: str, block: Section, name: str, limit_name: str) -> No
 def converted_value(path: str, value: Any, kind: Any) -> Any:
     """Convert a value to a type of the configuration, and check type, range and finiteness.
 
-    Args:
-        path: Dotted path of the value, for the error; empty for a whole configuration.
-        value: Numbers, texts, lists, dictionaries, sections; also NumPy's.
-        kind: Type with ranges as in ``msgspec.Meta``.
+    The dotted path is for errors; empty for a whole configuration.
 
     Raises:
         ConfigError: The value is not of this type; the error names it by its dotted path.

@@ -12,7 +12,6 @@ class ServoModel:
 
     Attributes:
         protocol: ``drives.protocol`` for it.
-        number: Its model number.
         speed: Speed without load at the recommended voltage [1/min], from its manual.
     """
 

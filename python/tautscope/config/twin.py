@@ -187,9 +187,5 @@ class TwinConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
         require_at_most("", self, "latency_jitter", "latency")
         require_names("disturb", self.disturb, DISTURBANCES)
         readout, frame_period = self.sensor.readout, 1 / self.frame_rate
-        require(
-            readout <= frame_period,
-            "sensor.readout",
-            readout,
-            f"at most one frame period, {frame_period:.3g}",
-        )
+        allowed = f"at most one frame period, {frame_period:.3g}"
+        require(readout <= frame_period, "sensor.readout", readout, allowed)
