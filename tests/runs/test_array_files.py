@@ -1,7 +1,5 @@
 """Arrays of NumPy and MATLAB, and columns with several numbers, as columns of a table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

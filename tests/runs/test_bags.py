@@ -1,7 +1,5 @@
 """ROS 2 bags as tables: topics, times, damage. The bags are of rosbags' own Writer."""
 
-from __future__ import annotations
-
 import re
 import sqlite3
 from contextlib import closing

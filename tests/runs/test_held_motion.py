@@ -1,7 +1,5 @@
 """A run in which motion is held: who re-engages it, and how the run ends where nobody can."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 

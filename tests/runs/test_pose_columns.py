@@ -1,7 +1,5 @@
 """Poses to an axis; the oracle is SciPy's rotations."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

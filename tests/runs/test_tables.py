@@ -1,7 +1,5 @@
 """Tables as laboratories write them: dialects, units, times, Parquet, standard input."""
 
-from __future__ import annotations
-
 import gzip
 import io
 from datetime import UTC, datetime, timedelta, timezone

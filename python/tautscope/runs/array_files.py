@@ -97,9 +97,7 @@ def with_single_numbers(
 ) -> pl.DataFrame:
     """A table in which each column with lists of numbers has become columns NAME.1, NAME.2, ...
 
-    Args:
-        frame: The table.
-        names: NAME -> names of its numbers, in place of 1, 2, ... if they are as many and differ.
+    Its `names` stand in place of 1, 2, ... if they are as many and differ.
     """
     import polars as pl  # noqa: PLC0415
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from itertools import chain
 from operator import attrgetter
 from os import PathLike
@@ -36,13 +35,8 @@ Part = tuple[str, Any, tuple[str, ...], tuple[float, ...]]
 """Prefix, header if there is one, titles, and values of one row."""
 
 
-@dataclass
-class _Rows:
-    """Rows of one topic with the same titles; times in ns."""
-
-    stamped: list[int] = field(default_factory=list)
-    logged: list[int] = field(default_factory=list)
-    values: list[tuple[float, ...]] = field(default_factory=list)
+_Rows = list[tuple[int, int, tuple[float, ...]]]
+"""Stamp and time of recording [ns], and values, of the rows of one topic with the same titles."""
 
 
 def read_bag(path: str | PathLike[str]) -> pl.DataFrame:
@@ -66,12 +60,11 @@ def read_bag(path: str | PathLike[str]) -> pl.DataFrame:
         raise RecordError(str(place), first_line(error), f"{_ALLOWED}, complete") from None
     if not groups:
         found = ", ".join(f"{topic} of {kind}" for topic, kind in types.items())
-        raise RecordError(
-            f"{place}, topics",
-            found or "none",
+        allowed = (
             "one with numbers of a type that is known, such as sensor_msgs/msg/JointState, "
-            "geometry_msgs/msg/PoseStamped or tf2_msgs/msg/TFMessage",
+            "geometry_msgs/msg/PoseStamped or tf2_msgs/msg/TFMessage"
         )
+        raise RecordError(f"{place}, topics", found or "none", allowed)
     return _table(groups)
 
 
@@ -89,11 +82,9 @@ def _read(path: Path) -> tuple[dict[tuple[str, ...], _Rows], dict[str, str]]:
             read = readers[connection.msgtype]
             assert read is not None
             for prefix, header, titles, values in read(bag.deserialize(data, connection.msgtype)):
-                rows = groups.setdefault((connection.topic + prefix, *titles), _Rows())
-                stamp = None if header is None else header.stamp
-                rows.stamped.append(0 if stamp is None else stamp.sec * 10**9 + stamp.nanosec)
-                rows.logged.append(logged)
-                rows.values.append(values)
+                stamp = 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
+                rows = groups.setdefault((connection.topic + prefix, *titles), [])
+                rows.append((stamp, logged, values))
     return groups, types
 
 
@@ -102,10 +93,11 @@ def _table(groups: dict[tuple[str, ...], _Rows]) -> pl.DataFrame:
 
     frames = []
     for (prefix, *titles), rows in groups.items():
-        stamped, logged = (np.array(each, np.int64) for each in (rows.stamped, rows.logged))
+        *times, values = zip(*rows, strict=True)
+        stamped, logged = (np.array(each, np.int64) for each in times)
         late = float(np.median(np.abs(stamped - logged))) / 1e9
         is_stamped = bool(np.all(stamped != 0)) and late < _OTHER_CLOCK
-        columns = np.array(rows.values, np.float64).T
+        columns = np.array(values, np.float64).T
         named = {f"{prefix}/{title}": each for title, each in zip(titles, columns, strict=True)}
         frames.append(pl.DataFrame({TIME: stamped if is_stamped else logged} | named))
     table = pl.concat(frames, how="diagonal").sort(TIME, maintain_order=True)

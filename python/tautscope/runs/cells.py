@@ -27,11 +27,7 @@ _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 def numbers(
     series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]
 ) -> tuple[Floats, int | None]:
-    """A column as numbers; dates and times of day become seconds since the first one.
-
-    Returns:
-        Numbers, and the date or time of day [ns] from which they count; None of other columns.
-    """
+    """A column as numbers, and None; dates and times of day as seconds since the first one [ns]."""
     import polars as pl  # noqa: PLC0415
 
     if series.dtype.is_temporal():
@@ -47,18 +43,14 @@ def numbers(
         is_bad = pl.repeat(False, len(values), eager=True)
     else:
         raise RecordError(f"{file}, column {name}", str(series.dtype), "numbers")
-    is_bad = is_bad | _is_too_large(values)
+    # Also infinities, but not NaN, which Polars orders above all numbers.
+    is_bad |= ((values.abs() > LARGEST) & values.is_not_nan()).fill_null(False)
     if is_bad.any():
         index = int(is_bad.arg_max() or 0)
         where = f"{file}, {line} {rows[index]}, column {name}"
         raise RecordError(where, text[index], _ALLOWED)
     found = values.fill_null(float("nan")).to_numpy().astype(np.float64)
     return np.where(np.abs(found) < 1 / LARGEST, 0.0, found), None
-
-
-def _is_too_large(values: pl.Series) -> pl.Series:
-    """Infinities, too; but not NaN, which Polars orders above all numbers."""
-    return ((values.abs() > LARGEST) & values.is_not_nan()).fill_null(False)
 
 
 def _with_decimal_point(text: pl.Series) -> pl.Series:

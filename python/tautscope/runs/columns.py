@@ -27,16 +27,7 @@ _ENOUGH = 20_000
 
 @dataclass(frozen=True)
 class Column:
-    """A column of numbers.
-
-    Attributes:
-        number: From 1 on.
-        title: As in the file.
-        unit: Empty if the file does not name it.
-        count: Number of values.
-        least: Least value.
-        largest: Largest value.
-    """
+    """A column of numbers, from number 1 on; the unit is empty if the file does not name it."""
 
     number: int
     title: str

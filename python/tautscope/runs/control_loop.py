@@ -59,21 +59,11 @@ class Monitor(Protocol):
 class ControlLoop:
     """Ticks of the loop on a rig, all of them in a log.
 
-    A tick is `control` with the reference, then all `updates`, then `step`.
-
-    Args:
-        config: Settings of the loop.
-        rig: The rig.
-        sample: The rig's newest sample; without it the rig is reset.
-        compensate: If false, the command is the reference; the estimators still run.
-        look: The image update.
-        executor: Runs the marker detection in the background, in place of `look`; a robot with
-            [[dof]] has none, and does not use its images.
-        monitor: Makes a monitor from the motors (n,) at the start.
+    A tick is `control` with the reference, then all `updates`, then `step`. The arguments are as of
+    `run_experiment`, and the rig's newest sample, without which the rig is reset. With an executor
+    a robot with [[dof]] does not use its images.
 
     Attributes:
-        loop: The loop.
-        sample: The newest sample.
         command: c (n,) [m or rad] of the last tick.
 
     Raises:

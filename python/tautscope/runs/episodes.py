@@ -26,12 +26,7 @@ _INFO = Path("meta", "info.json")
 
 @dataclass(frozen=True)
 class Episode:
-    """An episode of a data set.
-
-    Attributes:
-        number: As in the file.
-        file: The Parquet file that has it.
-    """
+    """An episode of a data set."""
 
     number: int
     file: Path
@@ -67,8 +62,7 @@ def list_episodes(folder: str | PathLike[str]) -> list[Episode]:
 def open_episode(folder: str | PathLike[str], episode: Episode) -> Sheet:
     """An episode as a table; the numbers of a feature are FEATURE.NAME, or FEATURE.1, ...
 
-    Raises:
-        RecordError: meta/info.json or the episode's file is damaged.
+    A damaged file is a `RecordError`.
     """
     import polars as pl  # noqa: PLC0415
 

@@ -29,11 +29,7 @@ class _Count:
 
 
 class FlagSummary:
-    """Counts the updates at which each flag was in force, and keeps the strongest reaction.
-
-    Args:
-        config: Of the run; its updates are by images, or by measurements of a robot with [[dof]].
-    """
+    """Counts the updates at which each flag was in force, and keeps the strongest reaction."""
 
     def __init__(self, config: Config) -> None:
         self._updates, self._what = 0, "measurements" if config.dof else "images"
@@ -41,13 +37,7 @@ class FlagSummary:
         self._limited: dict[str, None] = {}
 
     def add(self, elapsed: float, flags: Sequence[str], reaction: Reaction) -> None:
-        """Add an update.
-
-        Args:
-            elapsed: Time since the start of the run [s].
-            flags: `Report.warnings`.
-            reaction: To them.
-        """
+        """Add `Report.warnings`, and the reaction, of an update [s since the start of the run]."""
         self._updates += 1
         for name in flags:
             if name in MEANINGS:

@@ -15,11 +15,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def check_free(path: str | PathLike[str]) -> Path:
-    """Return the path if a new folder can be made there: nothing exists, or an empty folder.
-
-    Raises:
-        OutputError: The path is taken, or cannot be written.
-    """
+    """The path of an empty folder, or where a new one can be made; else an `OutputError`."""
     target = Path(path)
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
         raise OutputError("out", str(target), "a folder that is empty or does not exist yet")
@@ -28,11 +24,7 @@ def check_free(path: str | PathLike[str]) -> Path:
 
 
 def check_free_file(path: str | PathLike[str]) -> Path:
-    """Return the path if a new file can be made there, in a folder that exists.
-
-    Raises:
-        OutputError: The path is taken, or cannot be written.
-    """
+    """The path, where a new file can be made in a folder that exists; else an `OutputError`."""
     target = Path(path)
     if target.exists():
         raise OutputError("out", str(target), "a file that does not exist yet")
@@ -43,11 +35,7 @@ def check_free_file(path: str | PathLike[str]) -> Path:
 
 
 def check_writable(path: Path) -> None:
-    """Check that something can be made at a path, by making and removing a folder in or above it.
-
-    Raises:
-        OutputError: It cannot.
-    """
+    """Make and remove a folder in or above a path; an `OutputError` if that cannot be done."""
     from tempfile import TemporaryDirectory  # noqa: PLC0415  a tenth of the time to import the loop
 
     path = path.resolve()

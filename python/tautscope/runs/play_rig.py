@@ -36,7 +36,6 @@ class PlayRig:
 
     Attributes:
         ticks: Control periods since `reset`.
-        rng: Of the noise.
         kinematics: Of the configuration; None where each degree of freedom is measured.
 
     Wrong for real robots in that loops of one play have corners, nothing bends by itself, and no

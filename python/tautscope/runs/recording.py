@@ -85,8 +85,6 @@ class Recording:
             `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
             `innovation_*`, `true_features_*`. Of a robot with [[dof]] a row per measurement,
             without features.
-        config: The configuration of the run.
-        compensated: Whether compensation was on.
         segments: Which DOF moved when.
         snapshot: One frame from about the middle; not saved.
         warnings: A line for each disabled monitor, and for each flag raised

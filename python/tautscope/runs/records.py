@@ -61,7 +61,6 @@ class Record:
         time: (n,) [s], never decreasing; None if no column was named, or all times are equal. No
             model of the comparison uses it.
         rows: (n,) line of the file of each sample.
-        cleaning: What the cleaning did.
         units: Units of command and measured, as the file names them; empty where it does not.
         time_unit: That of the time, "s" of dates; empty where the file does not name it.
     """
@@ -237,12 +236,11 @@ def read_motors(
         size = float(np.abs(table[:, 1 + dof]).max())
         if largest is not None and dof.label not in named and size > largest[dof]:
             likely, unit = ("mm", "m") if dof is Dof.INSERTION else ("deg", "rad")
-            raise RecordError(
-                f"{path}, column {dof.label}",
-                f"{size:.4g} {unit}",
+            allowed = (
                 f"at most {largest[dof]:.3g} {unit}; if the column is in {likely}, type "
-                f"--units {dof.label}={likely}, or write its title as {dof.label}_{likely}",
+                f"--units {dof.label}={likely}, or write its title as {dof.label}_{likely}"
             )
+            raise RecordError(f"{path}, column {dof.label}", f"{size:.4g} {unit}", allowed)
     backward = np.flatnonzero(np.diff(table[:, 0]) <= 0)
     if len(backward):
         line = rows[backward[0] + 1]
@@ -255,12 +253,11 @@ def read_motors(
         raise RecordError(where, after, f"later than {before}")
     interval = float(np.median(np.diff(table[:, 0]))) if len(table) > 1 else 0.0
     if "time" not in named and interval > LONGEST_INTERVAL:
-        raise RecordError(
-            f"{path}, column time",
-            f"a position every {interval:g} s",
+        allowed = (
             f"at most {LONGEST_INTERVAL:g} s; if the column is in ms, type --units time=ms, or "
-            "write its title as time_ms",
+            "write its title as time_ms"
         )
+        raise RecordError(f"{path}, column time", f"a position every {interval:g} s", allowed)
     return table[:, 0], table[:, 1:]
 
 

@@ -27,11 +27,7 @@ _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 def update_row(now: float, seen: Frame | Measurement, report: Report, count: int) -> Row:
     """Result of an update in the order of `update_columns`; the true state comes later.
 
-    Args:
-        now: Time of arrival [s, the rig's clock].
-        seen: The frame or measurement.
-        report: Its update.
-        count: Number of the measurement in the run; a frame has its own.
+    A measurement has the number `count`, a frame its own; `now` is the time of arrival [s].
     """
     features: Row = ()
     if isinstance(seen, Measurement):
@@ -86,9 +82,8 @@ class _RowBuffer:
 class RunRecorder:
     """Collects the rows of a `Recording` in the order of events.
 
-    Args:
-        config: Its contact offsets are recorded until the first frame.
-        most: About how many rows of each table are kept, the newest ones; without it all.
+    Until the first frame the contact offsets are those of the configuration. About the newest
+    `most` rows of each table are kept, or all.
     """
 
     def __init__(self, config: Config, most: int | None = None) -> None:

@@ -35,8 +35,6 @@ class TableText:
         groups: Titles above the titles, each for all columns up to the next; empty if there are
             none.
         units: Of a line of units below the titles; empty if there is none.
-        width: Number of columns.
-        delimiter: Between cells.
         data: The lines below, without comments and blank lines.
         rows: (n,) their numbers in the file, from 1 on.
     """

@@ -57,7 +57,6 @@ class Sheet:
     """A table whose cells are not read yet.
 
     Attributes:
-        file: Its name, for errors.
         frame: Columns of text, or of Parquet and arrays as they are, in the order of the file.
         titles: Of the columns; their numbers if there is no title row.
         groups: Titles above the titles, or none.
@@ -135,11 +134,6 @@ def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "rec
     Those of a bag are as in `tautscope.runs.bags.read_bag`. Of quaternions (``tip_qx`` to
     ``tip_qw``) and points (``tip_x`` to ``tip_z``) there are also ``tip_q_turn`` and
     ``tip_travel``, see `tautscope.runs.pose_columns`.
-
-    Args:
-        path: The file; ``-`` is standard input.
-        names: Titles of the columns.
-        what: What the file is, for errors.
 
     Raises:
         MissingExtraError: Polars is not installed.

@@ -17,14 +17,7 @@ from tautscope.runs.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run.
-
-    Attributes:
-        config: Configuration of loop and twin.
-        compensate: Whether compensation is on.
-        motion: Reference; None is the article's protocol.
-        images: Whether the run needs camera images; without them the twin is faster.
-    """
+    """One run, without a motion of the article's protocol; without images the twin is faster."""
 
     config: Config
     compensate: bool

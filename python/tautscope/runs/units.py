@@ -70,11 +70,7 @@ def split_unit(title: str) -> tuple[str, str]:
 
 
 def check_unit(where: str, title: str) -> None:
-    """Refuse a title whose square brackets have neither a unit nor an index.
-
-    Raises:
-        RecordError: The unit is not known.
-    """
+    """Refuse a title with neither a unit nor an index in square brackets, with a `RecordError`."""
     match = _IN_BRACKETS.fullmatch(title.strip())
     if match and match[2] and not match[2].isdecimal() and not unit_of(match[2]):
         known = ", ".join(dict.fromkeys(_ANY.values()))
@@ -95,11 +91,7 @@ def time_scale(largest: float) -> float:
 
 
 def parse_units(text: str) -> dict[str, str]:
-    """Units as typed: ``insertion=mm,rotation=deg,bending=deg,time=ms``.
-
-    Raises:
-        FieldError: A column or a unit is not known.
-    """
+    """Units as typed, ``insertion=mm,rotation=deg,time=ms``; else a `FieldError`."""
     allowed = {dof.label: tuple(units_of(dof)) for dof in Dof} | {"time": tuple(TIMES)}
     found = {}
     for part in filter(None, (each.strip() for each in text.split(","))):
