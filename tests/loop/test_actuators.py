@@ -1,7 +1,5 @@
 """Motors that are not the degrees of freedom: maps there and back, limits, and the rig behind."""
 
-from __future__ import annotations
-
 import logging
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Wrong input of a robot's configuration, loop and rig: each error has field, value and remedy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -30,9 +30,9 @@ def header() -> str:
     requests = ", ".join(f"{name} = {1 << bit}" for bit, name in enumerate(REQUESTS))
     commands = "\n".join(
         f'    {{"{name}", Request::{name}, 0b'
-        + "".join(str(int(state in step.states)) for state in reversed(OperatingState))
-        + f", {goal(step.goal)}}},"
-        for name, step in STATE_COMMANDS.items()
+        + "".join(str(int(state in accepting)) for state in reversed(OperatingState))
+        + f", {goal(asked)}}},"
+        for name, (accepting, asked) in STATE_COMMANDS.items()
     )
     reactions = "\n".join(
         f"    {goal(state_by_reaction(reaction))}, // {reaction}" for reaction in Reaction

@@ -25,9 +25,6 @@ _ROUNDING, _SECANTS = 1e-9, 20
 class Actuators:
     """The map of section ``actuators``: motors = matrix q + offsets, or a function of the user's.
 
-    Args:
-        config: With [[dof]] and section ``actuators``.
-
     Raises:
         ConfigError: There is no such section; of ``map`` there is no such function or class.
     """

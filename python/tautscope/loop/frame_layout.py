@@ -26,9 +26,6 @@ _BYTE = np.dtype(np.uint8)
 class FrameLayout:
     """Memory layout of the images of a camera.
 
-    Args:
-        camera: The camera; its `width`, `height` and `pixel_format` are used.
-
     Attributes:
         shape: Shape of the arrays.
     """

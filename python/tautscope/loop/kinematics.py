@@ -156,18 +156,14 @@ def _arc(bend_x: float, bend_y: float, length: float) -> tuple[Floats, Floats]:
 
 
 def build_kinematics(config: Config) -> Kinematics | None:
-    """The kinematics of a configuration; None where the tip is measured degree by degree.
-
-    Raises:
-        ConfigError: As `own_kinematics`.
-    """
+    """As `own_kinematics`, in the frame of the sensor that measures poses."""
     kinematics, own = own_kinematics(config), config.kinematics
     is_placed = any((*own.base_position, *own.base_rotation, *own.sensor_rotation))
     return Placed(kinematics, own) if is_placed and kinematics is not None else kinematics
 
 
 def own_kinematics(config: Config) -> Kinematics | None:
-    """The kinematics in its own frame.
+    """The kinematics in its own frame; None where the tip is measured degree by degree.
 
     A class of yours is called without arguments.
 

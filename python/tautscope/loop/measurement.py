@@ -19,7 +19,7 @@ from tautscope.loop.kinematics import (
     jacobian_by_differences,
     rotation_vector,
 )
-from tautscope.loop.signal_checks import as_floats, check_covariance, check_numbers
+from tautscope.loop.signal_checks import as_floats, as_numbers, check_covariance, check_numbers
 
 Model = Callable[[Floats], tuple[Floats, Floats] | None]
 """State (n,) to the values (m,) that would be measured and their derivatives (m, n)."""
@@ -166,16 +166,9 @@ class Sensors:
 
 
 def check_rotation(orientation: ArrayLike) -> Floats:
-    """A rotation matrix (3, 3) of itself or of a quaternion (4,) x, y, z, w.
-
-    Raises:
-        SignalError: It is neither.
-    """
+    """Rotation matrix (3, 3) of itself or of a quaternion (4,) x, y, z, w; else a `SignalError`."""
     allowed = "a rotation matrix (3, 3) or a quaternion (4,) x, y, z, w of length 1"
-    try:
-        found = as_floats(orientation)
-    except (TypeError, ValueError, OverflowError):
-        raise SignalError("orientation", orientation, allowed) from None
+    found = as_numbers("orientation", orientation, allowed)
     if found.shape == (4,) and abs(float(found @ found) - 1) < 2 * _UNIT_LENGTH:
         x, y, z, w = found / np.sqrt(found @ found)
         return np.array(

@@ -29,11 +29,7 @@ def named_class(field: str, name: str, allowed: str) -> Any:
 
 
 def instance(field: str, name: str, found: Any) -> Any:
-    """What a class of the user makes without arguments.
-
-    Raises:
-        ConfigError: It needs arguments.
-    """
+    """What a class of the user makes without arguments; a `ConfigError` if it needs some."""
     try:
         return found()
     except TypeError as error:

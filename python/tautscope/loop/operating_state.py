@@ -1,7 +1,6 @@
 """Operating states of the collaborative robotics toolkit (CRTK), one machine for all of ROS 2."""
 
 from enum import StrEnum
-from typing import NamedTuple
 
 from tautscope.loop.safety import Reaction
 
@@ -18,27 +17,16 @@ class OperatingState(StrEnum):
     FAULT = "FAULT"
     """The drives are to be stopped; `enable` clears it, unless the loop has to be created anew."""
 
-    @property
-    def rank(self) -> int:
-        """0 to 3."""
-        return list(OperatingState).index(self)
-
-
-class Step(NamedTuple):
-    """In which states a command is accepted, and the state that it asks for."""
-
-    states: tuple[OperatingState, ...]
-    goal: OperatingState
-
 
 _DISABLED, _ENABLED, _PAUSED, _FAULT = OperatingState
 STATE_COMMANDS = {
-    "resume": Step((_PAUSED,), _ENABLED),
-    "enable": Step((_DISABLED, _PAUSED, _FAULT), _ENABLED),
-    "pause": Step((_ENABLED,), _PAUSED),
-    "disable": Step(tuple(OperatingState), _DISABLED),
+    "resume": ({_PAUSED}, _ENABLED),
+    "enable": ({_DISABLED, _PAUSED, _FAULT}, _ENABLED),
+    "pause": ({_ENABLED}, _PAUSED),
+    "disable": (set(OperatingState), _DISABLED),
 }
-"""Values of ``state_command``; of simultaneous ones what stops comes last."""
+"""Value of ``state_command`` -> the states in which it is accepted, and the state that it asks for;
+of simultaneous commands what stops comes last."""
 
 
 def state_by_reaction(reaction: Reaction) -> OperatingState:
@@ -62,12 +50,12 @@ class StateMachine:
         """The state while a reaction is in force."""
         if self.goal is OperatingState.DISABLED:
             return self.goal
-        return max(self.goal, state_by_reaction(reaction), key=lambda state: state.rank)
+        return max(self.goal, state_by_reaction(reaction), key=list(OperatingState).index)
 
     def accept(self, command: str, reaction: Reaction) -> bool:
         """Ask for the goal of one of `STATE_COMMANDS`; whether the present state allows it."""
-        step = STATE_COMMANDS[command]
-        is_allowed = self.state(reaction) in step.states
+        states, goal = STATE_COMMANDS[command]
+        is_allowed = self.state(reaction) in states
         if is_allowed:
-            self.goal = step.goal
+            self.goal = goal
         return is_allowed

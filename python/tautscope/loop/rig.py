@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.errors import SignalError, StateError
 from tautscope.loop.measurement import Measurement, Points, Pose, Tip
-from tautscope.loop.signal_checks import check_time
+from tautscope.loop.signal_checks import as_numbers, check_time
 
 _WATCH_PERIOD = 0.005
 """Time between two calls of `must_stop` [s]."""
@@ -156,10 +156,7 @@ def check_sample(sample: Sample, config: Config) -> Sample:
             if name == "true_state":
                 continue
             raise SignalError(f"sample.{name}", value, allowed)
-        try:
-            shape = np.asarray(value, dtype=np.float64).shape
-        except (TypeError, ValueError, OverflowError):
-            raise SignalError(f"sample.{name}", value, allowed) from None
+        shape = as_numbers(f"sample.{name}", value, allowed).shape
         if shape != (count,):
             raise SignalError(f"sample.{name}", f"an array {shape}", allowed)
     if not isinstance(sample.frame, Frame | None):

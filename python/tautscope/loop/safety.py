@@ -107,7 +107,6 @@ class Supervision:
     """State of the supervisor.
 
     Attributes:
-        reaction: The reaction in force.
         flags: The active flags, by the names of `DETECTORS`.
         latched: The flags raised since the last acknowledgement.
         lead: Share of the free gain in use, 0 to 1.

@@ -10,12 +10,8 @@ from tautscope.errors import SignalError
 
 
 def check_features(values: ArrayLike) -> NDArray[np.float64]:
-    """Features (4,) [px] as an array: each band finite, or NaN if not found; not both NaN.
-
-    Raises:
-        SignalError: They are anything else.
-    """
-    features = _numbers("features", values, "4 finite numbers")
+    """Features (4,) [px], each band finite, or NaN if not found, not both; else a `SignalError`."""
+    features = as_numbers("features", values, "4 finite numbers")
     if features.shape == (4,) and np.isnan(features).all():
         allowed = "None where neither band was found, NaN for the features of one"
         raise SignalError("features", features.tolist(), allowed)
@@ -27,25 +23,17 @@ def check_features(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_signal(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Finite numbers as an array of this shape; the error names `field`.
-
-    Raises:
-        SignalError: The shape is different, or a number is not finite.
-    """
+    """Finite numbers as an array of this shape; else a `SignalError` that names `field`."""
     allowed = "finite numbers"
     allowed = f"{shape[0]} {allowed}" if len(shape) == 1 else f"an array {shape} of {allowed}"
-    array = _numbers(field, values, allowed)
+    array = as_numbers(field, values, allowed)
     if array.shape != shape or not np.isfinite(array).all():
         raise SignalError(field, array.tolist(), allowed)
     return array
 
 
 def check_time(field: str, value: float) -> float:
-    """A finite time [s]; the error names `field`.
-
-    Raises:
-        SignalError: It is not a finite number.
-    """
+    """A finite time [s]; else a `SignalError` that names `field`."""
     try:
         if isinstance(value, float | int | np.floating | np.integer) and math.isfinite(value):
             return float(value)
@@ -55,37 +43,25 @@ def check_time(field: str, value: float) -> float:
 
 
 def check_numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Numbers of this shape as an array, none infinite and not all NaN; the error names `field`.
-
-    Raises:
-        SignalError: They are anything else.
-    """
+    """Numbers of this shape, none infinite and not all NaN; else a `SignalError` of `field`."""
     allowed = f"an array {shape} of numbers or NaN, not all NaN"
-    array = _numbers(field, values, allowed)
+    array = as_numbers(field, values, allowed)
     if array.shape != shape or np.isinf(array).any() or np.isnan(array).all():
         raise SignalError(field, array.tolist(), allowed)
     return array
 
 
 def check_values(values: ArrayLike) -> NDArray[np.float64]:
-    """1 to `MOST_VALUES` numbers or NaN as an array, none infinite and not all NaN.
-
-    Raises:
-        SignalError: They are anything else.
-    """
+    """1 to `MOST_VALUES` numbers, none infinite and not all NaN; else a `SignalError`."""
     allowed = f"1 to {MOST_VALUES} numbers or NaN, not all NaN"
-    array = _numbers("values", values, allowed)
+    array = as_numbers("values", values, allowed)
     if array.ndim != 1 or not 1 <= len(array) <= MOST_VALUES:
         raise SignalError("values", f"an array {array.shape}", allowed)
     return check_numbers("values", array, array.shape)
 
 
 def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.float64]:
-    """A covariance (count, count): symmetric and positive definite; the error names `field`.
-
-    Raises:
-        SignalError: It is not.
-    """
+    """A symmetric and positive definite covariance (count, count); else a `SignalError`."""
     array = check_signal(field, values, (count, count))
     variances = np.abs(np.diag(array))
     rounding = 1e-6 * np.sqrt(np.outer(variances, variances))
@@ -103,7 +79,8 @@ def as_floats(values: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 
-def _numbers(field: str, values: ArrayLike, allowed: str) -> NDArray[np.float64]:
+def as_numbers(field: str, values: ArrayLike, allowed: str) -> NDArray[np.float64]:
+    """`as_floats`, with a `SignalError` that names `field`, and what is `allowed`."""
     try:
         return as_floats(values)
     except (TypeError, ValueError, OverflowError):

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope import _core
 from tautscope.config import Config, check_config
 from tautscope.dof import Dof
-from tautscope.errors import FieldError
+from tautscope.errors import SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.signal_checks import as_floats
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.state_prediction import StatePrediction
 
 
@@ -79,7 +79,6 @@ class Detection:
             proximal band. NaN for a band that was not found.
         covariance: Covariance of the features (4, 4) [px^2]; NaN likewise.
         reasons: Why each band was not found; empty if it was.
-        scores: Scores of each band.
         regions: Regions of the markers' colour, the largest first, at most 32.
         discriminant: Discriminant that was used: 0 is the trained one, `vision.weights` and
             `vision.threshold`; others count `vision.alternatives` from 1.
@@ -149,9 +148,6 @@ class MarkerDetector:
     One detector may be shared between threads; calls take turns. No result depends on earlier
     images.
 
-    Args:
-        config: The configuration; `camera` and `vision` are used.
-
     Raises:
         ConfigError: All weights of the discriminant are zero, or too small or too large for the
             fixed-point arithmetic.
@@ -196,7 +192,7 @@ class MarkerDetector:
 
         Raises:
             FrameError: The image is not what the configured camera gives.
-            FieldError: The prediction is not four numbers.
+            SignalError: The prediction is not four numbers.
         """
         predicted = _checked_prediction(predicted_features)
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
@@ -229,17 +225,11 @@ class MarkerDetector:
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
     ) -> tuple[Region, ...]:
-        """The regions in windows of an image; the rest of it is not read.
+        """The regions in windows of an image, the largest first, at most 32; the rest is not read.
 
         A pixel is marker exactly if it is in the whole image. A region ends where its window does.
-
-        Args:
-            image: As `detect`.
-            windows: Left, top, and the column and row after the last [px]; a part outside the image
-                is ignored.
-
-        Returns:
-            The regions of all windows, the largest first, at most 32.
+        A window is left, top, and the column and row after the last [px]; a part outside the image
+        is ignored.
 
         Raises:
             FrameError: As `detect`.
@@ -303,12 +293,10 @@ def _workspace(config: Config) -> NDArray[np.float64]:
 def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | None:
     if predicted is None:
         return None
-    try:
-        features = as_floats(predicted)
-    except (TypeError, ValueError, OverflowError):
-        features = np.empty(0)
+    allowed = "four numbers u_A, v_A, u_B, v_B [px]"
+    features = as_numbers("predicted_features", predicted, allowed)
     if features.shape != (4,):
-        raise FieldError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")
+        raise SignalError("predicted_features", predicted, allowed)
     return features
 
 
