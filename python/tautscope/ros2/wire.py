@@ -31,7 +31,7 @@ class Entity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """Quality of service of a topic; volatile, keep last."""
+    """Quality of service of a topic: volatile, keep the last, send lost ones again if reliable."""
 
     depth: int = 10
     is_reliable: bool = True

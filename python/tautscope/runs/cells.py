@@ -1,18 +1,13 @@
 """Cells of a table as numbers: decimal commas, dates and times of day; with Polars."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from tautscope.errors import RecordError
 from tautscope.runs.table_text import NO_VALUE
-
-if TYPE_CHECKING:
-    import polars as pl
 
 Floats = NDArray[np.float64]
 
@@ -27,9 +22,10 @@ _CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 def numbers(
     series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]
 ) -> tuple[Floats, int | None]:
-    """A column as numbers, and None; dates and times of day as seconds since the first one [ns]."""
-    import polars as pl  # noqa: PLC0415
+    """A column as numbers; dates and times of day as seconds since the first one.
 
+    The second value is that first one [ns], None of other columns.
+    """
     if series.dtype.is_temporal():
         return _seconds(_nanoseconds(series))
     if series.dtype == pl.String:
@@ -69,8 +65,6 @@ def _times(text: pl.Series) -> pl.Series | None:
 
     Those without a time zone count as UTC.
     """
-    import polars as pl  # noqa: PLC0415
-
     plain = (
         text.str.replace(",", ".", literal=True)
         .str.replace(f"(Z|{_ZONE})$", "")
@@ -93,8 +87,6 @@ def _times(text: pl.Series) -> pl.Series | None:
 
 def _nanoseconds(times: pl.Series) -> pl.Series:
     """Dates, times of day or durations as whole numbers [ns]."""
-    import polars as pl  # noqa: PLC0415
-
     if times.dtype == pl.Duration:
         return times.dt.total_nanoseconds()
     if times.dtype == pl.Time:
@@ -104,8 +96,6 @@ def _nanoseconds(times: pl.Series) -> pl.Series:
 
 def _seconds(ticks: pl.Series) -> tuple[Floats, int]:
     """Seconds since the first time, NaN where there is none; and the first time [ns]."""
-    import polars as pl  # noqa: PLC0415
-
     known = ticks.drop_nulls()
     first = int(known[0]) if len(known) else 0
     seconds = ((ticks - first).cast(pl.Float64) / 1e9).fill_null(float("nan"))

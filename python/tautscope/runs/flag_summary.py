@@ -37,7 +37,7 @@ class FlagSummary:
         self._limited: dict[str, None] = {}
 
     def add(self, elapsed: float, flags: Sequence[str], reaction: Reaction) -> None:
-        """Add `Report.warnings`, and the reaction, of an update [s since the start of the run]."""
+        """Add an update at a time [s since the start]: `Report.warnings`, and the reaction."""
         self._updates += 1
         for name in flags:
             if name in MEANINGS:

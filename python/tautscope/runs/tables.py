@@ -18,7 +18,6 @@ from tautscope.errors import MissingPathError, RecordError
 from tautscope.extras import require_module
 from tautscope.runs import bags
 from tautscope.runs.array_files import first_line, read_arrays, with_single_numbers
-from tautscope.runs.cells import numbers
 from tautscope.runs.pose_columns import find_axes, title_of, travel, turn
 from tautscope.runs.table_text import split_table
 from tautscope.runs.units import check_unit, split_unit
@@ -96,6 +95,8 @@ class Sheet:
 
     def values(self, index: int, name: str) -> tuple[Floats, int | None]:
         """(n,) numbers of a column, and the date or time of day [ns] from which they count."""
+        from tautscope.runs.cells import numbers  # noqa: PLC0415  with Polars, which takes 0.3 s
+
         return numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
 
     def unit(self, index: int) -> str:

@@ -17,7 +17,7 @@ from tautscope.runs.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run, without a motion of the article's protocol; without images the twin is faster."""
+    """One run; its motion None is the article's protocol. Without images the twin is faster."""
 
     config: Config
     compensate: bool
