@@ -1,7 +1,5 @@
 """A simulated rig with features on a straight line over time, and runs of it with faults."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Centrelines of an instrument, and a camera to render them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

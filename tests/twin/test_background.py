@@ -1,7 +1,5 @@
 """Background images of the simulated camera."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

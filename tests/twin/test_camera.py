@@ -1,7 +1,5 @@
 """Position of the rendered bands, compared with OpenCV's projection and numerical integration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

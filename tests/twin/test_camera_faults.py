@@ -1,7 +1,5 @@
 """Faults of the camera: features, arrival times, time stamps, images."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

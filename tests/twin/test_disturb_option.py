@@ -1,7 +1,5 @@
 """Disturbances by name, on the command line and in a configuration."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

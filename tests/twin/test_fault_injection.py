@@ -1,7 +1,5 @@
 """Faults act at their time, on their target and on simulated rigs only; seeds reproduce them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

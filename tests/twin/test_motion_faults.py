@@ -1,7 +1,5 @@
 """Faults of drives, encoders, control tick, plant and operator input."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

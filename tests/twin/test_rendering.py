@@ -1,7 +1,5 @@
 """The rendered image: noise, clipping, sizes, and rejected input."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

@@ -1,7 +1,5 @@
 """Images as a camera delivers them: stamps, rolling shutter, exposure, compression."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

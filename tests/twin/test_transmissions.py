@@ -1,7 +1,5 @@
 """Instruments that differ: transmission, section and friction follow the laws that are stated."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,3 @@
 """The digital twin: a simulated rig that shares no code with the loop it tests."""
 
 from tautscope.twin.rig import Twin
-
-__all__ = ["Twin"]

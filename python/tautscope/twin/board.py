@@ -103,16 +103,10 @@ def _subpixels(size: int) -> Floats:
 def random_poses(
     camera: CameraConfig, extent: tuple[float, float], count: int, seed: int
 ) -> list[tuple[Floats, Floats]]:
-    """Poses of a board as a person shows it: everywhere in the image, near and far, tilted.
+    """Poses of a board, of a width and height [m], as a person shows it.
 
-    Args:
-        camera: The camera.
-        extent: Width and height of the board [m].
-        count: Number of poses.
-        seed: Random seed.
-
-    Returns:
-        Rotation vector and translation of each pose, as for `BoardCamera.draw`.
+    Everywhere in the image, near and far, tilted; rotation and translation as for
+    `BoardCamera.draw`.
     """
     random = np.random.default_rng((seed, 18))
     width, height = extent

@@ -14,20 +14,17 @@ from tautscope._core import Renderer
 from tautscope.config import CameraConfig, Config
 from tautscope.errors import ConfigError, FieldError
 from tautscope.twin.bands import Bands
-from tautscope.twin.disturbances import Disturbances
+from tautscope.twin.disturbances import NO_INSTRUMENT, Stage, disturbed
 from tautscope.twin.sensor import AutomaticExposure, Centreline, compress
 from tautscope.twin.tissue import draw_mucosa, load_backgrounds
 
 FRAMES_PER_BACKGROUND = 25
 """Number of frames after which the next image of the background folder is shown."""
+_NO_BANDS = Bands.from_surface(np.empty((0, 5)))
 
 
 def check_pixel_format(camera: CameraConfig) -> None:
-    """Refuse what is not simulated.
-
-    Raises:
-        ConfigError: The images of the camera are not B, G, R.
-    """
+    """Refuse a camera whose images are not B, G, R, with a `ConfigError`."""
     if camera.pixel_format != "bgr":
         raise ConfigError("camera.pixel_format", camera.pixel_format, "bgr, for simulated images")
 
@@ -65,9 +62,6 @@ class TwinCamera:
     casts a shadow (tissue is a flat background), or when the camera has a gamma (grey levels are
     proportional to light).
 
-    Args:
-        config: Sections camera, instrument and twin are used.
-
     Raises:
         ConfigError: A value is invalid for the renderer.
         MissingPathError: ``twin.background`` is not a folder with a readable image.
@@ -91,14 +85,12 @@ class TwinCamera:
             noise=twin.image_noise,
             seed=twin.seed % 2**64,
         )
-        self._disturbances = Disturbances(twin.disturb, twin.seed)
         self._twin = twin
         self.reset()
-        self._jpeg_quality = twin.sensor.jpeg_quality
         self._is_processed = (
-            self._disturbances.is_active
+            bool(twin.disturb)
             or twin.sensor.exposure_time_constant > 0
-            or self._jpeg_quality is not None
+            or twin.sensor.jpeg_quality is not None
         )
         if twin.background is None:
             self._backgrounds = [draw_mucosa(camera.width, camera.height, twin.seed)]
@@ -136,10 +128,7 @@ class TwinCamera:
     def draw_strips(self, strips: Sequence[Centreline], sequence: int) -> RenderedImage:
         """Draw each strip of rows of equal height, from the top, with a centreline of its own.
 
-        Args:
-            strips: Points and tangents of the centreline in each strip, as for `draw`. The ground
-                truth is that of the middle one.
-            sequence: Frame number, as for `draw`.
+        The ground truth is that of the middle one.
 
         Raises:
             FieldError: The frame number is negative.
@@ -149,10 +138,9 @@ class TwinCamera:
         background = self._backgrounds[sequence // FRAMES_PER_BACKGROUND % len(self._backgrounds)]
         if len(strips) == 1 and not self._is_processed:
             return RenderedImage(*self._renderer.draw(background, *strips[0], sequence))
-        disturbances = self._disturbances
-        if disturbances.hides_instrument:
+        if NO_INSTRUMENT in self._twin.disturb:
             strips = [(np.full_like(points, np.nan), tangents) for points, tangents in strips]
-        tissue = disturbances.apply_to_background(background, sequence)
+        tissue, _ = disturbed(self._twin, Stage.TISSUE, background, _NO_BANDS, sequence)
         middle = len(strips) // 2
         drawn, features, visible, surface = self._renderer.draw_scene(tissue, *strips[middle])
         edges = np.linspace(0, len(drawn), len(strips) + 1).round().astype(int).tolist()
@@ -160,12 +148,12 @@ class TwinCamera:
             if k != middle:
                 self._renderer.draw_rows(tissue, *strip, drawn, edges[k : k + 2])
         bands = Bands.from_surface(surface)
-        image, hidden = disturbances.apply_to_scene(drawn, bands, sequence)
+        image, hidden = disturbed(self._twin, Stage.SCENE, drawn, bands, sequence)
         image = self._exposure.expose(image)
         self._renderer.add_noise(image, sequence)
-        image, overlaid = disturbances.apply_to_output(image, bands, sequence)
-        image = compress(image, self._jpeg_quality)
-        if disturbances.is_active:
+        image, overlaid = disturbed(self._twin, Stage.OVERLAY, image, bands, sequence)
+        image = compress(image, self._twin.sensor.jpeg_quality)
+        if self._twin.disturb:
             visible = bands.visible_shares(hidden | overlaid)
             features[np.repeat(visible, 2) == 0] = np.nan
         return RenderedImage(image, features, visible)

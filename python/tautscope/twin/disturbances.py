@@ -20,14 +20,14 @@ changes them; the centroid of a visible part counts as measurement error. Distur
 reduce the visible share; smoke, blur, exposure and colour do not.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.config import TwinConfig
 from tautscope.twin import obstacles, optics, overlays
 from tautscope.twin.bands import Bands, Mask
 from tautscope.twin.noise import TemporalNoise
@@ -46,91 +46,42 @@ class Stage(IntEnum):
     """Image (uint8) after the sensor."""
 
 
-@dataclass(frozen=True, slots=True)
-class Disturbance:
-    """One entry of the table.
+Apply = Callable[[Any, Bands, TemporalNoise], tuple[Any, Mask | None]]
+"""Maps (image, bands, noise) to (image, mask of the pixels that now occlude the scene); may modify
+the given image."""
 
-    Attributes:
-        name: As in ``twin.disturb``.
-        stage: Where it acts.
-        apply: Maps (image, bands, noise) to (image, mask of the pixels that now occlude the
-            scene); may modify the given image.
-    """
-
-    name: str
-    stage: Stage
-    apply: Callable[[Any, Bands, TemporalNoise], tuple[Any, Mask | None]]
-
-
-TABLE = (
-    Disturbance("stool", Stage.TISSUE, obstacles.stool),
-    Disturbance("highlights", Stage.SCENE, obstacles.highlights),
-    Disturbance("debris", Stage.SCENE, obstacles.debris),
-    Disturbance("smoke", Stage.SCENE, obstacles.smoke),
-    Disturbance("touching", Stage.SCENE, optics.defocus),
-    Disturbance("motion_blur", Stage.SCENE, optics.motion_blur),
-    Disturbance("white_balance", Stage.SCENE, optics.white_balance),
-    Disturbance("exposure", Stage.SCENE, optics.exposure),
-    Disturbance("partial", Stage.SCENE, optics.field_stop),
-    Disturbance("text", Stage.OVERLAY, overlays.text),
-    Disturbance("inset", Stage.OVERLAY, overlays.inset),
-)
+TABLE: dict[str, tuple[Stage, Apply]] = {
+    "stool": (Stage.TISSUE, obstacles.stool),
+    "highlights": (Stage.SCENE, obstacles.highlights),
+    "debris": (Stage.SCENE, obstacles.debris),
+    "smoke": (Stage.SCENE, obstacles.smoke),
+    "touching": (Stage.SCENE, optics.defocus),
+    "motion_blur": (Stage.SCENE, optics.motion_blur),
+    "white_balance": (Stage.SCENE, optics.white_balance),
+    "exposure": (Stage.SCENE, optics.exposure),
+    "partial": (Stage.SCENE, optics.field_stop),
+    "text": (Stage.OVERLAY, overlays.text),
+    "inset": (Stage.OVERLAY, overlays.inset),
+}
 """In the order of the light path; ``no_instrument`` has no entry, because it draws nothing."""
 
 NO_INSTRUMENT = "no_instrument"
 
 
-class Disturbances:
-    """The active disturbances, in the order of `TABLE`.
-
-    Args:
-        names: ``twin.disturb``; duplicates have no effect.
-        seed: ``twin.seed``.
-
-    Attributes:
-        is_active: Whether any disturbance is active.
-        hides_instrument: Whether the instrument is left out.
-    """
-
-    def __init__(self, names: Sequence[str], seed: int) -> None:
-        self._seed = seed
-        self._active = [each for each in TABLE if each.name in names]
-        self.hides_instrument = NO_INSTRUMENT in names
-        self.is_active = bool(self._active) or self.hides_instrument
-
-    def apply_to_background(self, background: Image, sequence: int) -> Image:
-        """Apply those on the tissue to the background image."""
-        if not self._has(Stage.TISSUE):
-            return background
-        no_bands = Bands.from_surface(np.empty((0, 5)))
-        light = background.astype(np.float32)
-        return quantize(self._run(Stage.TISSUE, light, no_bands, sequence)[0])
-
-    def apply_to_scene(self, image: Image, bands: Bands, sequence: int) -> tuple[Image, Mask]:
-        """Image on the sensor, before noise, and the mask of occluded pixels."""
-        if not self._has(Stage.SCENE):
-            return image, np.zeros(image.shape[:2], dtype=bool)
-        light, hidden = self._run(Stage.SCENE, image.astype(np.float32), bands, sequence)
-        return quantize(light), hidden
-
-    def apply_to_output(self, image: Image, bands: Bands, sequence: int) -> tuple[Image, Mask]:
-        """Image with the overlays of the video processor, and the mask of their pixels."""
-        return self._run(Stage.OVERLAY, image, bands, sequence)
-
-    def _has(self, stage: Stage) -> bool:
-        return any(each.stage is stage for each in self._active)
-
-    def _run(self, stage: Stage, image: Any, bands: Bands, sequence: int) -> tuple[Any, Mask]:
-        hidden = np.zeros(image.shape[:2], dtype=bool)
-        for each in self._active:
-            if each.stage is stage:
-                noise = TemporalNoise(self._seed, each.name, sequence)
-                image, mask = each.apply(image, bands, noise)
-                if mask is not None:
-                    hidden |= mask
+def disturbed(
+    twin: TwinConfig, stage: Stage, image: Image, bands: Bands, sequence: int
+) -> tuple[Image, Mask]:
+    """The image after the disturbances of a stage, and the mask of the pixels that they occlude."""
+    hidden = np.zeros(image.shape[:2], dtype=bool)
+    active = [
+        (name, apply) for name, (at, apply) in TABLE.items() if at is stage and name in twin.disturb
+    ]
+    if not active:
         return image, hidden
-
-
-def quantize(light: NDArray[np.float32]) -> Image:
-    """Convert light to grey levels: rounded, clipped at 0 and 255."""
-    return np.clip(np.rint(light), 0, 255).astype(np.uint8)
+    is_light = stage is not Stage.OVERLAY
+    changed: Any = image.astype(np.float32) if is_light else image
+    for name, apply in active:
+        changed, mask = apply(changed, bands, TemporalNoise(twin.seed, name, sequence))
+        if mask is not None:
+            hidden |= mask
+    return np.clip(np.rint(changed), 0, 255).astype(np.uint8) if is_light else changed, hidden

@@ -31,14 +31,8 @@ def draw_values(config: Config, seed: int) -> dict[str, Any]:
     Focal lengths, principal point, k1, pose of the guide, length of the section and positions of
     the bands differ uniformly from the configured ones, the bands at most by what keeps them apart
     and on the tip. What was calibrated on the twin of this seed stays, so that the rig does while
-    one calibration after the other is written. Images are stamped late by a drawn delay.
-
-    Args:
-        config: The configuration before the calibration.
-        seed: Of the draw and `twin.seed`; the same seed gives the same rig.
-
-    Returns:
-        Dotted path -> value, as for `Config.replace`.
+    one calibration after the other is written. Images are stamped late by a drawn delay. The same
+    seed gives the same rig. The keys are dotted paths, as for `Config.replace`.
     """
     random = np.random.default_rng([_DOMAIN, seed])
     camera, instrument = config.camera, config.instrument
@@ -83,11 +77,5 @@ def draw_rig(config: Config, seed: int) -> Config:
 
 def draw_geometry(config: Config, seed: int) -> Config:
     """The rig of `draw_rig` with a calibrated camera, apart from its focal lengths."""
-    camera = config.camera
-    return draw_rig(config, seed).replace(
-        **{
-            "camera.cx": camera.cx,
-            "camera.cy": camera.cy,
-            "camera.distortion": camera.distortion,
-        }
-    )
+    kept = {f"camera.{key}": getattr(config.camera, key) for key in ("cx", "cy", "distortion")}
+    return draw_rig(config, seed).replace(**kept)

@@ -50,13 +50,9 @@ class Kind:
     """A kind of fault: a row of the table.
 
     Attributes:
-        name: Unique name, as in `Fault.kind`.
-        target: The item that fails.
-        mode: The failure mode.
         severity: Smallest and largest severity.
         unit: Unit of the severity; mm become `PER_MM` times as many rad on rotation and bending.
         hazard: Row of the hazard table in docs/safety.md.
-        what: Effect, in words.
         has_duration: Whether it ends; otherwise it happens at its start and stays.
         on_images: Whether it has a model for images, besides the one for features.
     """
@@ -175,11 +171,9 @@ class Fault:
     """One fault to inject.
 
     Attributes:
-        kind: A name of `KINDS`.
         start: Start time [s, the twin's clock].
         duration: Duration [s]; infinite for a permanent fault.
         severity: Severity in the kind's unit; None is the largest.
-        dof: DOF of the drive or of the operator input.
     """
 
     kind: str

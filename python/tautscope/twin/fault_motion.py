@@ -12,7 +12,6 @@ from tautscope.twin.fault_state import FaultState, Floats
 from tautscope.twin.plant import Plant
 
 AxisFault = Callable[[float, FaultState], float]
-PlantFault = Callable[[Plant, FaultState], None]
 
 EVENT_RATE = 5.0
 """Rate of intermittent spikes and stalls [1/s]."""
@@ -40,7 +39,7 @@ def _hold(value: float, fault: FaultState) -> float:
 
 
 def _hold_intermittently(value: float, fault: FaultState) -> float:
-    if int(fault.elapsed / fault.spec.size) % 2 or "held" not in fault.memory:
+    if int(fault.elapsed / fault.size) % 2 or "held" not in fault.memory:
         fault.memory["held"] = value
     return float(fault.memory["held"])
 
@@ -49,7 +48,7 @@ def _delay(value: float, fault: FaultState) -> float:
     """The delayed value; the first one until the delay has passed."""
     past: deque[tuple[float, float]] = fault.hold("past", deque())
     past.append((fault.elapsed, value))
-    while len(past) > 1 and past[1][0] <= fault.elapsed - fault.spec.size:
+    while len(past) > 1 and past[1][0] <= fault.elapsed - fault.size:
         past.popleft()
     return past[0][1]
 
@@ -69,34 +68,40 @@ def _limit_range(value: float, fault: FaultState) -> float:
 
 def _scale(value: float, fault: FaultState) -> float:
     start = _hold(value, fault)
-    return start + fault.spec.size * (value - start)
+    return start + fault.size * (value - start)
 
 
 def _unscale(value: float, fault: FaultState) -> float:
     """The encoder position in the wrong counts: it agrees with the command."""
     start = fault.memory.get("held", value)
-    return float(start + (value - start) / fault.spec.size)
+    return float(start + (value - start) / fault.size)
 
 
 def _add_noise(value: float, fault: FaultState) -> float:
     return value + fault.amplitude * fault.rng.uniform(-1, 1)
 
 
-def _hold_and_ramp(value: float, fault: FaultState) -> float:
-    return _hold(value, fault) + fault.sign * fault.amplitude * fault.elapsed
-
-
-def _add_ramp(value: float, fault: FaultState) -> float:
-    return value + fault.sign * fault.amplitude * fault.elapsed
-
-
 def _add_offset(value: float, fault: FaultState) -> float:
-    return value + fault.sign * fault.amplitude
+    return value + fault.signed_amplitude
 
 
-def _subtract_offset(value: float, fault: FaultState) -> float:
-    """The encoder position without the jump: only the jump itself is visible to the drive."""
-    return value - fault.sign * fault.amplitude
+def _add_spikes(value: float, fault: FaultState) -> float:
+    if int(fault.elapsed * EVENT_RATE) != fault.memory.get("period"):
+        fault.memory["period"] = int(fault.elapsed * EVENT_RATE)
+        return value + fault.amplitude * float(fault.rng.choice((-1, 1)))
+    return value
+
+
+def _resample(value: float, fault: FaultState) -> float:
+    if fault.elapsed >= fault.memory.get("next", 0.0):
+        fault.memory["next"] = fault.elapsed + 1 / fault.size
+        fault.memory["held"] = value
+    return float(fault.memory["held"])
+
+
+def _add_tremor(value: float, fault: FaultState) -> float:
+    frequency = fault.hold("frequency", fault.rng.uniform(6, 12))
+    return value + fault.amplitude * float(np.sin(2 * np.pi * frequency * fault.elapsed))
 
 
 DRIVE_FAULTS: dict[str, AxisFault] = {
@@ -109,43 +114,22 @@ DRIVE_FAULTS: dict[str, AxisFault] = {
     "axis_reversed": lambda value, fault: 2 * _hold(value, fault) - value,
     "axis_scaled": _scale,
     "axis_shaking": _add_noise,
-    "axis_runs": _hold_and_ramp,
+    "axis_runs": lambda value, fault: _hold(value, fault) + fault.signed_amplitude * fault.elapsed,
     "encoder_jump": _add_offset,
 }
 """Kind -> model from the command to the set-point of the motor."""
-
 ENCODER_FAULTS: dict[str, AxisFault] = {
     "axis_scaled": _unscale,
-    "encoder_jump": _subtract_offset,
+    # Only the jump itself is visible to the drive.
+    "encoder_jump": lambda value, fault: value - fault.signed_amplitude,
     "encoder_stuck": _hold,
     "encoder_noisy": _add_noise,
 }
 """Kind -> model from the motor position to the position the drive reports."""
-
-
-def _add_spikes(value: float, fault: FaultState) -> float:
-    if int(fault.elapsed * EVENT_RATE) != fault.memory.get("period"):
-        fault.memory["period"] = int(fault.elapsed * EVENT_RATE)
-        return value + fault.amplitude * float(fault.rng.choice((-1, 1)))
-    return value
-
-
-def _resample(value: float, fault: FaultState) -> float:
-    if fault.elapsed >= fault.memory.get("next", 0.0):
-        fault.memory["next"] = fault.elapsed + 1 / fault.spec.size
-        fault.memory["held"] = value
-    return float(fault.memory["held"])
-
-
-def _add_tremor(value: float, fault: FaultState) -> float:
-    frequency = fault.hold("frequency", fault.rng.uniform(6, 12))
-    return value + fault.amplitude * float(np.sin(2 * np.pi * frequency * fault.elapsed))
-
-
 REFERENCE_FAULTS: dict[str, AxisFault] = {
     "hand_step": _add_offset,
     "hand_spikes": _add_spikes,
-    "hand_fast": _add_ramp,
+    "hand_fast": lambda value, fault: value + fault.signed_amplitude * fault.elapsed,
     "hand_noisy": _add_noise,
     "hand_nan": lambda _, fault: float(fault.rng.choice([np.nan, np.inf, -np.inf])),
     "hand_silent": _hold,
@@ -157,31 +141,21 @@ REFERENCE_FAULTS: dict[str, AxisFault] = {
 """Kind -> model from the operator's reference to the reference of the input device."""
 
 
-def _change_bends(plant: Plant, fault: FaultState, duration: float) -> None:
+def _changed_bends(plant: Plant, fault: FaultState, duration: float) -> dict[str, float]:
     before = fault.hold("bends", plant.bends)
     share = min(1.0, fault.elapsed / duration) if duration else 1.0
-    plant.bends = before + share * (fault.spec.size - before)
+    return {"bends": before + share * (fault.size - before)}
 
 
-def _push_tip(plant: Plant, fault: FaultState) -> None:
-    plant.tip_force = fault.spec.size
-
-
-def _jerk_tip(plant: Plant, fault: FaultState) -> None:
-    plant.tip_force = fault.spec.size * (int(2 * JERK_RATE * fault.elapsed) % 2 == 0)
-
-
-def _set_section_friction(plant: Plant, fault: FaultState) -> None:
-    plant.section_friction = fault.spec.size
-
-
-PLANT_FAULTS: dict[str, PlantFault] = {
-    "straightens": lambda plant, fault: _change_bends(plant, fault, STRAIGHTENING_TIME),
-    "straightens_suddenly": lambda plant, fault: _change_bends(plant, fault, 0.0),
-    "winds": lambda plant, fault: _change_bends(plant, fault, WINDING_TIME),
-    "tissue_pushes": _push_tip,
-    "tissue_jerks": _jerk_tip,
-    "section_stiff": _set_section_friction,
-    "section_loose": _set_section_friction,
+PLANT_FAULTS: dict[str, Callable[[Plant, FaultState], dict[str, float]]] = {
+    "straightens": lambda plant, fault: _changed_bends(plant, fault, STRAIGHTENING_TIME),
+    "straightens_suddenly": lambda plant, fault: _changed_bends(plant, fault, 0.0),
+    "winds": lambda plant, fault: _changed_bends(plant, fault, WINDING_TIME),
+    "tissue_pushes": lambda _, fault: {"tip_force": fault.size},
+    "tissue_jerks": lambda _, fault: {
+        "tip_force": fault.size * (int(2 * JERK_RATE * fault.elapsed) % 2 == 0)
+    },
+    "section_stiff": lambda _, fault: {"section_friction": fault.size},
+    "section_loose": lambda _, fault: {"section_friction": fault.size},
 }
-"""Kind -> model that changes the plant before each of its steps."""
+"""Kind -> attributes that the plant has before each of its steps."""

@@ -18,13 +18,9 @@ class FaultState:
     """One injected fault with its state; the input of its fault model.
 
     Attributes:
-        spec: Kind, time, severity and DOF.
-        rng: Random generator of this fault.
         image_size: (width, height) [px].
         channel_jacobian: Returns (4,) [px/m], motion of the features per insertion.
         elapsed: Time since the start of the fault [s].
-        memory: State that the fault model keeps between calls.
-        stalls: Number of stalls so far.
     """
 
     spec: Fault
@@ -33,7 +29,6 @@ class FaultState:
     channel_jacobian: Callable[[], Floats] = lambda: np.zeros(4)
     elapsed: float = 0.0
     memory: dict[str, Any] = field(default_factory=dict)
-    stalls: int = 0
 
     @classmethod
     def seeded(cls, spec: Fault, seed: int, index: int, **context: Any) -> Self:
@@ -49,19 +44,29 @@ class FaultState:
         return is_active
 
     @property
-    def amplitude(self) -> float:
-        """The severity, given in mm, in the unit of the fault's DOF [m or rad]."""
-        return self.spec.size * PER_MM[self.spec.dof]
+    def size(self) -> float:
+        """The severity."""
+        return self.spec.size
 
     @property
-    def sign(self) -> float:
-        """-1 or 1, drawn once."""
-        return float(self.hold("side", self.rng.choice((-1, 1))))
+    def signed_size(self) -> float:
+        """The severity with a sign that is drawn once."""
+        return float(self.hold("side", self.rng.choice((-1, 1)))) * self.size
 
-    def count(self, key: str = "count") -> int:
-        """Number of earlier calls with this key."""
-        number: int = self.memory.get(key, 0)
-        self.memory[key] = number + 1
+    @property
+    def amplitude(self) -> float:
+        """The severity, given in mm, in the unit of the fault's DOF [m or rad]."""
+        return self.size * PER_MM[self.spec.dof]
+
+    @property
+    def signed_amplitude(self) -> float:
+        """As `amplitude`, with the sign of `signed_size`."""
+        return self.signed_size * PER_MM[self.spec.dof]
+
+    def count(self) -> int:
+        """Number of earlier calls."""
+        number: int = self.memory.get("count", 0)
+        self.memory["count"] = number + 1
         return number
 
     def hold(self, key: str, value: Any) -> Any:

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tautscope.config import Config
 from tautscope.errors import FieldError
-from tautscope.loop.references import Reference, Segment
+from tautscope.loop.references import Reference
 from tautscope.loop.rig import Frame, Sample
 from tautscope.twin import fault_motion as motion
 from tautscope.twin.fault_frames import (
@@ -20,20 +22,10 @@ from tautscope.twin.fault_frames import (
 from tautscope.twin.fault_kinds import KINDS, PER_MM, Fault, Kind, Mode, Target
 from tautscope.twin.fault_state import FaultState, Floats
 from tautscope.twin.plant import Plant
-from tautscope.twin.projection import channel_jacobian
 from tautscope.twin.rig import Twin
 
-__all__ = [
-    "KINDS",
-    "PER_MM",
-    "Fault",
-    "FaultyReference",
-    "FaultyRig",
-    "FeatureFrame",
-    "Kind",
-    "Mode",
-    "Target",
-]
+_STEP = 1e-4
+"""Insertion over which the motion of the features is measured [m]."""
 
 
 class FaultyRig:
@@ -51,7 +43,6 @@ class FaultyRig:
         seed: Random seed; the same seed gives the same bytes.
 
     Attributes:
-        control_period: Control period [s].
         true_time: Time of the twin's clock [s], which clock faults do not change.
 
     Raises:
@@ -116,7 +107,7 @@ class FaultyRig:
                 self._seed,
                 index,
                 image_size=(camera.width, camera.height),
-                channel_jacobian=lambda: channel_jacobian(self._twin.config, self._twin.plant),
+                channel_jacobian=lambda: _channel_jacobian(self._twin.config, self._twin.plant),
             )
             for index, fault in enumerate(self._faults)
         ]
@@ -139,7 +130,8 @@ class FaultyRig:
     def _change_plant(self, plant: Plant) -> None:
         for fault in self._active(Target.PHYSICS):
             fault.memory["acted"] = True
-            motion.PLANT_FAULTS[fault.spec.kind](plant, fault)
+            for name, value in motion.PLANT_FAULTS[fault.spec.kind](plant, fault).items():
+                setattr(plant, name, value)
         for fault in self._states:
             # A fault that ended restores the plant once: later its values may be another fault's.
             if not fault.spec.is_active(self.true_time) and fault.memory.pop("acted", False):
@@ -189,42 +181,28 @@ class FaultyRig:
     def _missed_ticks(self) -> int:
         missed = 0.0
         for fault in self._active(Target.TICK):
-            kind, stalls = fault.spec.kind, fault.stalls
+            kind, stalls = fault.spec.kind, fault.memory.get("stalls", 0)
             is_due = kind == "stalls" and fault.elapsed * motion.EVENT_RATE >= stalls
             if is_due or (kind == "stall" and stalls == 0):
-                fault.stalls += 1
-                missed += fault.spec.size
+                fault.memory["stalls"] = stalls + 1
+                missed += fault.size
         return round(missed / self.control_period)
 
 
 class FaultyReference:
     """The operator's reference through an input device with faults; a `Reference`.
 
-    Call it once per tick, with rising times.
-
-    Args:
-        reference: The operator's reference.
-        faults: Those of the operator input are applied, others have no effect.
-        seed: As for `FaultyRig`.
+    Call it once per tick, with rising times. Faults of anything else have no effect.
     """
 
     def __init__(self, reference: Reference, faults: Sequence[Fault], seed: int) -> None:
         self._reference = reference
+        self.duration, self.segments = reference.duration, reference.segments
         self._states = [
             FaultState.seeded(fault, seed, index)
             for index, fault in enumerate(faults)
             if fault.row.target is Target.REFERENCE
         ]
-
-    @property
-    def duration(self) -> float:
-        """Duration of the reference [s]."""
-        return self._reference.duration
-
-    @property
-    def segments(self) -> Sequence[Segment]:
-        """Segments of the reference."""
-        return self._reference.segments
 
     def __call__(self, time: float) -> Floats:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
@@ -237,3 +215,17 @@ def _with_content_fault(frame: Frame, fault: FaultState) -> Frame:
     if isinstance(frame, FeatureFrame):
         return replace(frame, features=FEATURE_FAULTS[kind](frame.features, fault))
     return replace(frame, image=IMAGE_FAULTS[kind](frame.image, fault))
+
+
+def _channel_jacobian(config: Config, plant: Plant) -> Floats:
+    """(4,) [px/m] motion of the band centres in the image per insertion of the instrument."""
+    camera, instrument = config.camera, config.instrument
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
+    pose = camera.camera_from_guide
+    points, directions = plant.centreline()
+    markers = np.array((instrument.marker_a, instrument.marker_b))[:, None]
+    bands = points[-2] + markers * directions[-2]
+    ends = np.vstack([bands, bands + np.array([0.0, 0.0, _STEP])])
+    pose_vectors = np.array(pose.rotation), np.array(pose.translation)
+    pixels, _ = cv2.projectPoints(ends, *pose_vectors, matrix, np.array(camera.distortion))
+    return np.asarray(np.diff(pixels.reshape(2, 4), axis=0)[0] / _STEP, dtype=np.float64)

@@ -24,13 +24,6 @@ class FrictionVariation:
     with p, q, s from `FrictionConfig`; x is the position of insertion or bending from the centre of
     the experiment's reference over its amplitude, t the time, v a speed of sliding, and v_s the
     constants above (Stribeck).
-
-    Args:
-        config: p, q, s and period, of shaft and section.
-        experiment: Centres and amplitudes.
-
-    Attributes:
-        is_constant: Whether all factors are one.
     """
 
     def __init__(self, config: FrictionConfig, experiment: ExperimentConfig) -> None:
@@ -46,11 +39,7 @@ class FrictionVariation:
     ) -> tuple[Floats, Floats, Floats]:
         """Factors of the shaft's segments, the section's joints and the cables' masses.
 
-        Args:
-            insertion: [m].
-            bending: [rad].
-            time: [s].
-            speeds: Of segments [m/s], joints [rad/s] and masses [m/s].
+        At an insertion [m], bending [rad] and time [s], by their speeds [m/s, rad/s, m/s].
         """
         config = self._config
         x = (np.array([insertion, bending]) - self._centre) / self._amplitude

@@ -14,13 +14,7 @@ Texture = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class TemporalNoise:
-    """Random numbers of one disturbance at one frame: a smooth function of the frame number.
-
-    Attributes:
-        seed: ``twin.seed``.
-        name: Name of the disturbance.
-        sequence: Frame number.
-    """
+    """Random numbers of one disturbance at one frame: a smooth function of the frame number."""
 
     seed: int
     name: str

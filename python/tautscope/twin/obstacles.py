@@ -4,8 +4,6 @@ Images are the light before the sensor: float32 (height, width, 3), BGR, in grey
 undisturbed exposure, not clipped at 255.
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -74,46 +72,41 @@ def highlights(light: LinearImage, bands: Bands, noise: TemporalNoise) -> Distur
                 semi_axes = rng.uniform([0.06, 0.05], [0.16, 0.14])
             semi_axes = np.maximum(semi_axes * [length, thickness], 0.8)
             tilt = float(np.arctan2(along[1], along[0]) + rng.normal(0, 0.1))
-            _Streak(bands.centre(k) + offset, semi_axes, tilt, level).blend(light, hidden)
+            centre = bands.centre(k) + offset
+            _blend_streak(light, hidden, centre, semi_axes, tilt=tilt, level=level)
     return light, hidden
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Streak:
-    """An elliptic reflection with a soft, uneven edge and a faint halo.
+def _blend_streak(
+    light: LinearImage,
+    hidden: Mask,
+    centre: Floats,
+    semi_axes: Floats,
+    *,
+    tilt: float,
+    level: float,
+) -> None:
+    """Blend in an elliptic reflection with a soft, uneven edge and a faint halo, all [px, rad].
 
-    Attributes:
-        centre: u, v [px].
-        semi_axes: Semi-axes [px].
-        tilt: Angle of the first axis, from u to v [rad].
-        level: Opacity, 0 to 1.
+    Image and mask of the hidden pixels are changed in place; `level` is the opacity.
     """
-
-    centre: Floats
-    semi_axes: Floats
-    tilt: float
-    level: float
-
-    def blend(self, light: LinearImage, hidden: Mask) -> None:
-        """Blend the reflection into the image and mark the pixels it hides, both in place."""
-        box = _crop(light, self.centre, float(self.semi_axes.max()) + 10)
-        if box is None or self.level < 0.02:
-            return
-        x, y = _offsets(box, self.centre)
-        cos, sin = np.cos(self.tilt), np.sin(self.tilt)
-        u, v = x * cos + y * sin, y * cos - x * sin
-        a, b = self.semi_axes
-        ripple = 1 + 0.22 * np.sin(0.35 * u + a) + 0.12 * np.sin(0.83 * u + b)
-        b = b * ripple
-        # Signed distance to the ellipse [px], to first order.
-        level_set = np.hypot(u / a, v / b)
-        distance = (1 - level_set) * level_set / np.maximum(np.hypot(u / a**2, v / b**2), 1e-6)
-        sharp = (1 / (1 + np.exp(-3.3 * np.clip(distance, -8, 8)))).astype(np.float32)
-        glow = 0.12 * np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.5))
-        opacity = (np.float32(self.level) * np.maximum(sharp, glow))[..., None]
-        part = light[box]
-        part += opacity * (np.array(REFLECTION, dtype=np.float32) - part)
-        hidden[box] |= opacity[..., 0] > 0.4
+    box = _crop(light, centre, float(semi_axes.max()) + 10)
+    if box is None or level < 0.02:
+        return
+    x, y = _offsets(box, centre)
+    u, v = x * np.cos(tilt) + y * np.sin(tilt), y * np.cos(tilt) - x * np.sin(tilt)
+    a, b = semi_axes
+    ripple = 1 + 0.22 * np.sin(0.35 * u + a) + 0.12 * np.sin(0.83 * u + b)
+    b = b * ripple
+    # Signed distance to the ellipse [px], to first order.
+    level_set = np.hypot(u / a, v / b)
+    distance = (1 - level_set) * level_set / np.maximum(np.hypot(u / a**2, v / b**2), 1e-6)
+    sharp = (1 / (1 + np.exp(-3.3 * np.clip(distance, -8, 8)))).astype(np.float32)
+    glow = 0.12 * np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.5))
+    opacity = (np.float32(level) * np.maximum(sharp, glow))[..., None]
+    part = light[box]
+    part += opacity * (np.array(REFLECTION, dtype=np.float32) - part)
+    hidden[box] |= opacity[..., 0] > 0.4
 
 
 def debris(light: LinearImage, bands: Bands, noise: TemporalNoise) -> Disturbed:

@@ -26,10 +26,6 @@ _UNSTABLE = (
 class Plant:
     """Drives, and the friction and elasticity between them and the tip.
 
-    Args:
-        config: Geometry, twin and start posture (the centres of `config.experiment`).
-        generator: Random generator of the variation between instruments.
-
     Attributes:
         bends: Number of bends of the scope; may be changed at any time.
         tip_force: Force on the distal end of the shaft, outwards [N]; may be changed at any time.

@@ -23,10 +23,6 @@ class Twin:
         config: The rig's geometry and `config.twin`.
         images: Whether frames are rendered; without frames the twin is several times faster.
 
-    Attributes:
-        config: The configuration it was made from.
-        control_period: Control period [s].
-
     Wrong when inertia matters (inertias are raised for the time step, see `twin/mjcf.py`), when
     scope or tissue move, or when the instrument touches tissue.
     """
@@ -34,6 +30,7 @@ class Twin:
     def __init__(self, config: Config, *, images: bool = True) -> None:
         self.config = check_config(config)
         self.control_period = config.control.period
+        self.has_images = images
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None
         self._ticks = 0
@@ -49,17 +46,8 @@ class Twin:
         return self._ticks * self.control_period
 
     @property
-    def has_images(self) -> bool:
-        """Whether frames are rendered."""
-        return self._camera is not None
-
-    @property
     def plant(self) -> Plant:
-        """The simulated plant, for inspection and fault injection.
-
-        Raises:
-            SignalError: Before `reset` or after `close`.
-        """
+        """The plant, for inspection and faults; a `SignalError` before `reset` or after `close`."""
         if self._plant is None:
             raise SignalError("rig", "closed", "a twin after reset() and before close()")
         return self._plant

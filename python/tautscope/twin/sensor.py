@@ -28,12 +28,6 @@ class AutomaticExposure:
         gain <- gain (target / mean)^(1 - exp(-frame period / time constant))
 
     Wrong when the sensor has saturated: light above 255 is lost before the gain.
-
-    Args:
-        config: Frame rate, time constant and target.
-
-    Attributes:
-        gain: Of the next frame.
     """
 
     def __init__(self, config: TwinConfig) -> None:

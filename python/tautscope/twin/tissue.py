@@ -28,10 +28,9 @@ RAY_GRID = (160, 128)
 
 
 def load_backgrounds(folder: str | PathLike[str], width: int, height: int) -> list[Image]:
-    """Read the images of a folder, sorted by name, and resize them to the camera's size [px].
+    """Images of a folder, sorted by name, uint8 (height, width, 3) BGR of the camera's size [px].
 
-    Returns:
-        uint8 (height, width, 3) BGR each; files that are not images are skipped.
+    Files that are not images are skipped.
 
     Raises:
         MissingPathError: There is no such folder, or it has no readable image.
@@ -41,36 +40,24 @@ def load_backgrounds(folder: str | PathLike[str], width: int, height: int) -> li
     if not path.is_dir():
         raise MissingPathError("twin.background", str(folder), allowed)
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
-    backgrounds = [
-        _resize(np.asarray(image, dtype=np.uint8), width, height)
-        for file in files
-        if (image := cv2.imread(str(file), cv2.IMREAD_COLOR)) is not None
-    ]
+    backgrounds = []
+    for file in files:
+        if (image := cv2.imread(str(file), cv2.IMREAD_COLOR)) is not None:
+            shrinks = image.shape[0] > height or image.shape[1] > width
+            method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+            fitted = cv2.resize(image, (width, height), interpolation=method)
+            backgrounds.append(np.ascontiguousarray(fitted, dtype=np.uint8))
     if not backgrounds:
         raise MissingPathError("twin.background", str(folder), allowed)
     return backgrounds
-
-
-def _resize(image: Image, width: int, height: int) -> Image:
-    shrinks = image.shape[0] > height or image.shape[1] > width
-    method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
-    fitted = cv2.resize(image, (width, height), interpolation=method)
-    return np.ascontiguousarray(fitted, dtype=np.uint8)
 
 
 def draw_mucosa(width: int, height: int, seed: int) -> Image:
     """Draw a colon segment: folds around a dark lumen, vessels, specular highlights.
 
     Rays are cast on a folded tunnel, which is lit from the camera; light falls with a softened
-    square of the distance, as under the exposure control of a scope.
-
-    Args:
-        width: Image width [px].
-        height: Image height [px].
-        seed: Random seed; the same seed gives the same bytes.
-
-    Returns:
-        uint8 (height, width, 3), BGR.
+    square of the distance, as under the exposure control of a scope. The same seed gives the same
+    bytes: uint8 (height, width, 3), BGR.
     """
     rng = np.random.default_rng(seed)
     depth, facing = _cast_rays(rng)
@@ -81,7 +68,8 @@ def draw_mucosa(width: int, height: int, seed: int) -> Image:
         + 0.05 * _fractal_noise(rng, width, height, 5)
         + 0.04 * _fractal_noise(rng, width, height, 60)
     )
-    light *= _vignetting(width, height)
+    x, y = np.meshgrid(np.linspace(-1, 1, width), np.linspace(-1, 1, height))
+    light *= 1 - 0.30 * np.clip((x * x + y * y) / 2, 0, 1) ** 1.5  # vignetting
     level = np.clip(1.45 * light, 0, 1.2)[..., None]
 
     redness = _fractal_noise(rng, width, height, 4)[..., None]
@@ -160,11 +148,6 @@ def _fractal_noise(rng: np.random.Generator, width: int, height: int, cells: int
         fine = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
         total += np.asarray(fine, dtype=np.float32) / 2**octave
     return np.asarray(total / max(float(total.std()), 1e-9), dtype=np.float64)
-
-
-def _vignetting(width: int, height: int) -> Floats:
-    x, y = np.meshgrid(np.linspace(-1, 1, width), np.linspace(-1, 1, height))
-    return 1 - 0.30 * np.clip((x * x + y * y) / 2, 0, 1) ** 1.5
 
 
 def _draw_vessels(rng: np.random.Generator, width: int, height: int) -> Floats:

@@ -19,10 +19,6 @@ class Transmission:
     It is in series with the servos, before friction and elasticity, because MuJoCo has neither a
     gap at one place of the stroke nor a lag that the encoder of the motor does not show.
 
-    Args:
-        config: Gain, offset, slack and lag.
-        start: Motor and end (3,) in the start posture [m, rad, rad].
-
     Attributes:
         position: Of the ends (3,) [m, rad, rad].
     """

@@ -6,5 +6,3 @@ physics.
 
 from tautscope.twin.colonoscope.parameters import ColonoscopeParameters
 from tautscope.twin.colonoscope.rig import ColonoscopeTwin
-
-__all__ = ["ColonoscopeParameters", "ColonoscopeTwin"]

@@ -51,11 +51,6 @@ class Plant:
     tip and its angle a against the guide, (bend_x, bend_y) = a (z_x, z_y) / |(z_x, z_y)|, smooth
     also where the section is straight; insertion is the position of the section's base.
 
-    Args:
-        parameters: Geometry, stiffness and friction.
-        period: Control period [s].
-        start: (3,) command [rad, rad, m] at the start.
-
     Raises:
         ConfigError: The parameters are not a MuJoCo model.
     """
@@ -108,8 +103,7 @@ class Plant:
     def step(self, command: Floats) -> None:
         """Simulate one control period; the motors follow the command (3,) [rad, rad, m].
 
-        Raises:
-            ConfigError: The simulation is unstable.
+        An unstable simulation is a `ConfigError`.
         """
         limit = self._speed_limit * self._period
         travel = np.minimum(np.maximum(command - self._motor, -limit), limit) / self._substeps

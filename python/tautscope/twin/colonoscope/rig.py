@@ -36,9 +36,6 @@ class ColonoscopeTwin:
         told_delay: The delay that the measurements' time stamps assume [s]; without it `delay`.
         drift: Largest drift of the measured position [m].
 
-    Attributes:
-        parameters: Of the instrument.
-
     Wrong when inertia matters (inertias are raised for the time step), or when tip or shaft are
     pressed against tissue.
 
@@ -76,11 +73,7 @@ class ColonoscopeTwin:
 
     @property
     def plant(self) -> Plant:
-        """The simulated plant, for inspection.
-
-        Raises:
-            SignalError: Before `reset` or after `close`.
-        """
+        """The simulated plant, for inspection; a `SignalError` before `reset` or after `close`."""
         if self._plant is None:
             raise SignalError("rig", "closed", "a twin after reset() and before close()")
         return self._plant

@@ -28,12 +28,8 @@ class EmTracker:
     about the axis across both, which has no roll. Noise is white and Gaussian, in all three axes.
     The drift, as of a field distorted by metal that moves, is a slow sine per coordinate.
 
-    Args:
-        generator: Random generator of noise and drift.
-        delay: Time from measurement to arrival [s].
-        told_delay: The delay that the time stamp assumes [s]; without it `delay`. A stamp is the
-            arrival less this delay, so that it is wrong by delay - told_delay.
-        drift: Largest drift of the position [m].
+    The arguments are as of `ColonoscopeTwin`. A stamp is the arrival less the told delay, so that
+    it is wrong by delay - told_delay.
     """
 
     def __init__(
