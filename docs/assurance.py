@@ -3,8 +3,6 @@
 ``uv run docs/assurance.py``; tests/docs/test_assurance.py requires that both are up to date.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator

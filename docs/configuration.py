@@ -4,8 +4,6 @@
 up to date.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 tests/docs/test_foxglove_layout.py finds each path in a log.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ The loop needs two centroids in px and the time of capture.
 Run it with ``uv run python examples/own_detector.py``.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

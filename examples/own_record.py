@@ -4,8 +4,6 @@ Here the record is simulated: a drive moves by two sines, the tip has a backlash
 position is measured with noise. Run it with ``uv run python examples/own_record.py``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from tautscope import Estimator, Play, replay
 from tautscope.metrics import rms

@@ -4,8 +4,6 @@ This one simulates drives and camera by three plays and a drawn image.
 Run it with ``uv run python examples/own_rig.py``.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

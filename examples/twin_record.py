@@ -4,8 +4,6 @@
 ``uv run tautscope analyze record.csv --command motor --measured tip --time time``.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Writes ROS 2 bags with rosbags' own Writer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ The plants are plays of this folder, independent of the package; the tip is meas
 times per second, 50 ms late. `--write` updates docs/plants.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

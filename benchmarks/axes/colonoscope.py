@@ -1,7 +1,5 @@
 """An operator's motion on the simulated colonoscope, and the delay of its tracker."""
 
-from __future__ import annotations
-
 from tautscope.calibration.robot import fit, move, sweep_motion
 from tautscope.commands.robot_calibration import result
 from tautscope.config import load_config

@@ -1,7 +1,5 @@
 """The first 40 s of loops of which nobody knows where in the slack they start."""
 
-from __future__ import annotations
-
 import numpy as np
 from tautscope import PlayRig, Sample, axes, run_experiment
 from tautscope.config import Sine

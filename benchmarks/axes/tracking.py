@@ -1,7 +1,5 @@
 """Loops of 1 to 8 degrees of freedom on plays, and their computing time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 

@@ -15,8 +15,6 @@ and a camera stream, at 100 Hz in real time.
   motion, on a rig whose camera, pose, lengths and delay differ from it.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

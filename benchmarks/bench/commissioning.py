@@ -1,7 +1,5 @@
 """What a user does with a new rig before its first run, on the bench."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

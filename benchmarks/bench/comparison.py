@@ -1,7 +1,5 @@
 """The article's protocol on the bench, compared with the in-process twin."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import tempfile

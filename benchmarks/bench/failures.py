@@ -3,8 +3,6 @@
 Faults of the motors are those of benchmarks/drives.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import tempfile

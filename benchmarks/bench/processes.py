@@ -1,7 +1,5 @@
 """The two processes of the bench: the rig, and the one that controls it."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Results of the bench as tables of docs/hardware.md."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -5,8 +5,6 @@ N twins whose loop is told wrong (pose to 5 deg and 5 mm, section 10 %, bands 1 
 with the result; records that the model cannot explain.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

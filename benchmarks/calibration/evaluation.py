@@ -1,7 +1,5 @@
 """Errors of a calibration, and of the loop with its result."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Calibration records of simulated rigs that differ from their configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Replacement of the generated sections of documentation pages."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

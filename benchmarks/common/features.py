@@ -1,7 +1,5 @@
 """True marker features with noise in place of camera images, for runs without rendering."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parallel runs in worker processes, or on a Dask cluster."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import multiprocessing

@@ -1,7 +1,5 @@
 """Rows of the output: one quantity with its goal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from statistics import median
 from typing import Any

@@ -1,7 +1,5 @@
 """Images of fewer pixels, for runs that need only the true features of an image."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config

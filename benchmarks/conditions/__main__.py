@@ -5,8 +5,6 @@ and procedural mucosa, one condition at a time. Each is evaluated twice: with a 
 loop, and without. `--write` updates the table of docs/conditions.md, which defines the quantities.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

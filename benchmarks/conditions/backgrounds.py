@@ -1,7 +1,5 @@
 """Backgrounds of the condition benchmark: procedural mucosa, colon frames, crops of them."""
 
-from __future__ import annotations
-
 import tempfile
 from functools import cache
 from pathlib import Path

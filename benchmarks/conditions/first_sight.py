@@ -8,8 +8,6 @@ is known of the posture in any of them.
     uv run python benchmarks/conditions/first_sight.py --sequences 2 --write
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

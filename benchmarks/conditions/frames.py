@@ -1,7 +1,5 @@
 """Frames of the condition benchmark: rendering at random poses, and evaluation of the detector."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Rows and table of the condition benchmark."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

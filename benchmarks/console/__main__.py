@@ -6,8 +6,6 @@ Debian's chromium is needed for --images, --ticks, --warnings, --steer and --han
     uv run python benchmarks/console --images 30 --ticks 60 --warnings 50 --hand 120
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Hazards of steering and of a second master: runs, and how many of them failed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Requests that the console must refuse: without token, forged, malformed or random."""
 
-from __future__ import annotations
-
 import http.client
 import itertools
 import json

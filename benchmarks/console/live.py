@@ -1,7 +1,5 @@
 """Figures of the console with a browser: latency of images, control ticks, operator motion."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Consoles in processes of their own, and pages without a browser."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every control of the page used, and each input device that holds one degree of freedom."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

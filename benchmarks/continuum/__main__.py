@@ -5,8 +5,6 @@ first two thirds of the record; regressions and filters also learn in the last t
 have seen. `--write` updates docs/plants.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Predictions of the tip where it was last seen some rows ago; none uses what comes later."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

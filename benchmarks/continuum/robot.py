@@ -3,8 +3,6 @@
 The record is not in the repository. Each of nine tendons ends at a segment and passes those before.
 """
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ and the first pair of its columns judged; every 50th one is analysed in full, by
 status 1 after a traceback, or if a file takes more than 10 s of processor time, in full 30 s.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """Files that `analyze` reads, written and then damaged at random."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import shutil

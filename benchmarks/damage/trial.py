@@ -1,7 +1,5 @@
 """A file that is tried, and many of them."""
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import io

@@ -8,8 +8,6 @@ motors to hold before, and has asked a silent one to for a second), which motors
 and for how long, and when they stop by themselves. ``--realtime`` requests SCHED_FIFO for both.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

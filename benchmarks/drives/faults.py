@@ -1,7 +1,5 @@
 """What may happen to motors on a bus, and how it must end, by protocol."""
 
-from __future__ import annotations
-
 import os
 import signal
 import struct

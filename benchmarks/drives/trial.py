@@ -4,8 +4,6 @@ The motors run in a thread of this process, which records where they are in each
 controller is forked, so that it can be killed, stopped and paused.
 """
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 import os

@@ -4,8 +4,6 @@ Every run is compared with the fault-free run: same instrument, noise and motion
 estimated before the fault; a reference of up to 12.6 mm/s. `--kind K --seed S` repeats one run.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Command line of the fault campaign, and its runs in parallel."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

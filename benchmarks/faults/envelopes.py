@@ -4,8 +4,6 @@ Faults of motors, endoscope, tissue and input device move the tip by themselves.
 responsible for motion beyond the envelope.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.twin.faults import Fault

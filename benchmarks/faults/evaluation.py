@@ -4,8 +4,6 @@ Everything is relative to the fault-free run, which continues from the same stat
 noise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

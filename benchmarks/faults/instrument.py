@@ -5,8 +5,6 @@ every run continues from an identical state of loop and physics, and gives the s
 and among others.
 """
 
-from __future__ import annotations
-
 import gc
 import math
 import os

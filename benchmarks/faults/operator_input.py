@@ -1,7 +1,5 @@
 """Operator input of a run with a fault, and the input device that reports it to the loop."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Recorder of what the loop reports during a run with a fault."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Rigs of the fault campaign: a twin without images, and drives that protect themselves."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection
 from dataclasses import replace

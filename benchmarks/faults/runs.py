@@ -1,7 +1,5 @@
 """All runs of one seed of the fault campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Scenarios of the fault campaign: instrument, motion, and a randomly drawn fault."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows and Markdown tables of the fault campaign."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence

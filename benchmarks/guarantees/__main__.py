@@ -7,8 +7,6 @@ Measures only what the options request; `--write` keeps the other rows of the ta
     uv run python benchmarks/guarantees --campaign rows.json --each each.json --write
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

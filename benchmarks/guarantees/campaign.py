@@ -1,7 +1,5 @@
 """Goals that are measured on the rows of the fault campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

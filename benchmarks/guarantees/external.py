@@ -1,7 +1,5 @@
 """Goals that other programs measure: tests of the core, the compiler, and killed processes."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Goals of the log: disks that are full or slow, and logs that are truncated or damaged."""
 
-from __future__ import annotations
-
 import errno
 import math
 import os

@@ -1,7 +1,5 @@
 """Goals of the whole loop: computing time, performance, stalls and repeatability."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import subprocess

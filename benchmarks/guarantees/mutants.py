@@ -1,7 +1,5 @@
 """Mutation testing (G22b), in parts that add up."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Goals of the timeouts: how soon motion ends when the input device or a drive falls silent."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from pathlib import Path

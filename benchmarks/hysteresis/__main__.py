@@ -4,8 +4,6 @@ Every value is the median over the seeds, with the worst seed. Camera images are
 `--write` updates docs/hysteresis.md and its figures.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

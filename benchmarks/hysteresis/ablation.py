@@ -1,7 +1,5 @@
 """Ablation: profile `best` without one of its ideas at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of the hysteresis benchmark: traces of the first seed, or dots for every seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from pathlib import Path
 

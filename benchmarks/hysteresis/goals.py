@@ -1,7 +1,5 @@
 """Goals of the hysteresis benchmark, and the conditions under which they are measured."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from tautscope.config import DISTURBANCES, LawConfig

@@ -1,7 +1,5 @@
 """Figures of the hysteresis benchmark: loops in the article's protocol, and shared functions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Quantities measured on a recording of the hysteresis benchmark."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables and figures of the hysteresis benchmark in the documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from common.doc_pages import insert

@@ -1,7 +1,5 @@
 """Scenarios of the hysteresis benchmark: their runs, and the values measured on the recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Simulated runs of the hysteresis benchmark."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import msgspec

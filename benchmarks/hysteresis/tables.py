@@ -1,7 +1,5 @@
 """Rows of the hysteresis benchmark from the values of every seed, and tables from rows."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from statistics import median

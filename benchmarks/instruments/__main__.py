@@ -4,8 +4,6 @@
 `instruments.properties`. `--seed S` repeats one instrument.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

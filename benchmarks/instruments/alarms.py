@@ -1,7 +1,5 @@
 """Alarms without a fault: the share of the images with each flag."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which properties explain the reductions: a forest's permutation importance."""
 
-from __future__ import annotations
-
 import numpy as np
 from instruments.properties import TABLE
 from instruments.rows import Row, reductions

@@ -1,7 +1,5 @@
 """The properties in which drawn instruments differ, their ranges, and the draw."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

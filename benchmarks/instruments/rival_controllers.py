@@ -1,7 +1,5 @@
 """What a laboratory would use instead: visual servoing, and constant compensation."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from typing import Protocol

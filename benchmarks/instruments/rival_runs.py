@@ -1,7 +1,5 @@
 """One run of a controller on a drawn instrument, with a given latency and loss of images."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

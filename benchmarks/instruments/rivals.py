@@ -7,8 +7,6 @@ On drawn instruments under an operator's motion, with true features and noise in
 `--tune` prints the reductions on the tuning instruments by gain; the best are the constants below.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

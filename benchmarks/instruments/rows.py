@@ -1,7 +1,5 @@
 """From the figures of the runs to rows per seed, and to quantities over all seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """One run on a drawn instrument, and the figures of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal
 

@@ -4,8 +4,6 @@ Each is independent of the package: plays per DOF with another gain, shape or ch
 feedback is features with noise, 80 ms late. `--write` updates docs/plants.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

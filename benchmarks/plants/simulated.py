@@ -1,7 +1,5 @@
 """Simulated instruments with other hystereses than the twin's, as rigs without images."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

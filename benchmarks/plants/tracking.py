@@ -1,7 +1,5 @@
 """Tracking error and estimates of a simulated instrument."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from common.features import update_from_features

@@ -1,7 +1,5 @@
 """Write the table of reactions of crates/core/src/supervision/reactions.rs to docs/safety.md."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

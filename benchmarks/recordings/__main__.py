@@ -6,8 +6,6 @@ a random time; what is missing in the log. ``--replays 50``: replayed runs of th
 video; of the twin with ``--noise``, or with ``--folder`` of the images there.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Recordings whose process is killed."""
 
-from __future__ import annotations
-
 import mmap
 import os
 import struct

@@ -1,7 +1,5 @@
 """Recorded runs that are replayed, and image formats for recordings."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

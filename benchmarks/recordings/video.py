@@ -1,7 +1,5 @@
 """Lossless image and video formats for recordings: size and processor time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from fractions import Fraction

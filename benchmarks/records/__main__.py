@@ -8,8 +8,6 @@ verdicts`), with figures to look at (`--figures`); its compensator on the other 
 updates docs/models.md and docs/verdicts.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

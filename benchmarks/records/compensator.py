@@ -1,7 +1,5 @@
 """The compensator of an identified record, on plays that are fitted to the other half of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ motion, the tip its projection on the direction in which it follows this command
 moves at the same time, and its coupling is a disturbance.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 

@@ -1,7 +1,5 @@
 """Errors of all models on a record, and what the weighted mixture does after a change."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

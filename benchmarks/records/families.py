@@ -4,8 +4,6 @@ The generators share no code with the package. Command and tip have one unit; th
 about 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

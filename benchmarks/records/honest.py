@@ -1,7 +1,5 @@
 """Verdicts on simulated records of known truth: right, silent, or confident and wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Three motors as action and, measured, in observation.state, with the pose of the
 x follows the first motor, the turn about z the second, y the third.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """The loop's own filter on real records, beside the trivial predictors and the mixture."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 The generators share no code with the package.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Records of real cable-driven tools, which are not in the repository."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

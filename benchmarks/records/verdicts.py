@@ -1,7 +1,5 @@
 """Verdicts on all real records, beside those of a reader who has seen the figures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -4,8 +4,6 @@ uv run python benchmarks/ros2 --bits 60
 uv run python benchmarks/ros2 --round-trip 600 --silences 20 --kills 20
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """The node as a process, in real time, with a node of ROS 2 written in Rust: tests/ros2/peer."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@ References, images and positions go to the node as messages over Zenoh, in a ses
 commands come back the same way. The Python loop gets the arrays and times themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 Messages go over Zenoh, in a session for each node.
 """
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import time

@@ -4,8 +4,6 @@ On ideal plays, on the twin, and on the twin with faults of the images. Every te
 run is judged by itself. `--write` updates the tables of these plants in docs/soak.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """One case of the soak: a run of hours, judged tenth by tenth."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal

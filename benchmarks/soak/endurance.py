@@ -4,8 +4,6 @@ Ideal plays and an operator's motion that is the same in every session; a sessio
 and log anew, in the same process. `--write` updates docs/soak.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """References of the soak: strokes of given lengths, periodic or as an operator makes them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 

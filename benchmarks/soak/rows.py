@@ -1,7 +1,5 @@
 """From the outcomes of the soak to rows with goals, and to a table."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

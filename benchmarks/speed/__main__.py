@@ -6,8 +6,6 @@ is h(q), its interaction matrix, the step and the rank check; NumPy only compute
 ``pinv(matrix) @ innovation`` for a given matrix.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import statistics

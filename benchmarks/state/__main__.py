@@ -8,8 +8,6 @@ The estimate of `best` is that of a loop's first image; the first reference is t
 `--images` adds the state error of both profiles in the whole loop with images (a minute per seed).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

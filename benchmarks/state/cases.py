@@ -1,7 +1,5 @@
 """Cases of the state estimation benchmark, and the errors of every estimator in them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 With images: physics, rendering, and the loop with its detector. Without: physics alone.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -12,8 +12,6 @@ goals are for the first state. In "repeated" rows nothing is between the calls, 
 loop.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -4,8 +4,6 @@ Each finds the centroids of the regions in a B, G, R frame and returns the numbe
 ViSP tracks one.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Images of the vision benchmark, and the time that each detector takes on them."""
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Every line comes out of the package's own `Play` and `Compensator`; the offsets 
 Run it with ``uv run python docs/figures/problem.py``.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

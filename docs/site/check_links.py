@@ -3,8 +3,6 @@
 ``python docs/site/check_links.py target/site``; exit status 1 and a line per problem otherwise.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator

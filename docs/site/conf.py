@@ -3,8 +3,6 @@
 The source folder is the repository, so that its pages are used where they are and as they are.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import tomllib

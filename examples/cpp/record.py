@@ -27,8 +27,6 @@ starts from without a prediction: starts, their standard deviations, postures. U
 px; NaN is not known.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -7,8 +7,6 @@ It stands for the nodes of your motors and of your tracker: plays of 0.6 rad in 
     python examples/ros2/input_device.py
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

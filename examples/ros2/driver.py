@@ -6,8 +6,6 @@ It stands for the node of your motors: replace `Motors`.
     python examples/ros2/driver.py
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

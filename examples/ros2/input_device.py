@@ -4,8 +4,6 @@ tautscope ros2 --twin --listen tcp/127.0.0.1:7447
 python examples/ros2/input_device.py
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

@@ -4,8 +4,6 @@ Reilink, Stramigioli, Misra, Mechatronics 23 (2013) 652-658. The names below are
 when first used: importing the package imports neither MuJoCo nor OpenCV nor matplotlib nor MCAP.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

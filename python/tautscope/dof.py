@@ -1,7 +1,5 @@
 """The three degrees of freedom, in the order every (3,) array has."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from enum import IntEnum
 from typing import Protocol, Self

@@ -1,7 +1,5 @@
 """Errors: one base class, one subclass per cause; each has the facts as attributes."""
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Optional dependencies: modules of each extra, their versions, the error if one is missing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec

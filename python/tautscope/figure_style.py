@@ -1,7 +1,5 @@
 """Palette and style of every figure; nothing here uses pyplot's global state or a display."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager

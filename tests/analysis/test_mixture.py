@@ -1,7 +1,5 @@
 """Prediction at sights: trivial predictors, tracked regression, weighted mixture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The benchmark of image conditions counts as it is defined."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conditions import first_sight

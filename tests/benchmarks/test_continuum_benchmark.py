@@ -1,7 +1,5 @@
 """The benchmark of a real continuum robot: its model, its split, and that its filter predicts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

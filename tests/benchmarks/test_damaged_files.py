@@ -1,7 +1,5 @@
 """`analyze` of damaged files refuses them with a message; a small part of `benchmarks/damage`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The fault campaign: evaluation of runs, and repeatability of a row."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """Faults are detected by the whole loop with its monitors, row by row of the hazard table."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

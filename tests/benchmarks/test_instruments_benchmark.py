@@ -1,7 +1,5 @@
 """The campaign over drawn instruments: the draw, what the loop is told, the rows, the cluster."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

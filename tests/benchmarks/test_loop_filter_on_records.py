@@ -1,7 +1,5 @@
 """The loop's filter on real records: the records themselves, ratios and goals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from common.paths import ROOT

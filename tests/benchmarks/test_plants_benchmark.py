@@ -1,7 +1,5 @@
 """The instruments of the plants benchmark have the hystereses that its page states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

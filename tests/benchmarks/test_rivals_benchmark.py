@@ -1,7 +1,5 @@
 """The rivals of `best`: their laws on ideal plays, the loss of images, and the rows of a cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from common.paths import ROOT

@@ -1,7 +1,5 @@
 """The soak: its references, its tenths, and the goals of its rows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

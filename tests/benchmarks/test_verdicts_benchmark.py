@@ -1,7 +1,5 @@
 """Verdicts on simulated and real records: what counts as right, and that all have been read."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`tautscope analyze` of a data set of LeRobot in the layout of OpenRC."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

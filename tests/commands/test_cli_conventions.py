@@ -1,7 +1,5 @@
 """What all commands have in common: options, exit status, messages, pipes, extras."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import logging

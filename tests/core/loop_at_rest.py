@@ -1,7 +1,5 @@
 """A loop of profile `paper` after a constant reference, and its configuration."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config

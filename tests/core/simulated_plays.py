@@ -1,7 +1,5 @@
 """A run of the loop on three simulated plays in the images of an ideal camera with noise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Profile `best` on three simulated plays in the images of an ideal camera."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

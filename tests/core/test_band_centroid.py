@@ -1,7 +1,5 @@
 """The centroid of a band's visible surface (decision 0002) against numerical integration."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Projection, Eq. (8), and poses against OpenCV."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

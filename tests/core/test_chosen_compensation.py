@@ -1,7 +1,5 @@
 """The operator's share of the compensation: bumpless, and off is off."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

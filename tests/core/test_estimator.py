@@ -1,7 +1,5 @@
 """The estimator on a record: causal prediction, offsets, triggers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tautscope import _core

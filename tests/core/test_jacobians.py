@@ -1,7 +1,5 @@
 """Analytic Jacobians of f, g and h against finite differences, also near singular states."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

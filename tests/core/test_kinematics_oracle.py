@@ -4,8 +4,6 @@ The error of a chain of equal links with equal hinge angles is of second order i
 the test extrapolates it from two chains.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import mujoco

@@ -3,8 +3,6 @@
 Profile `paper` unless stated; test_adaptive_loop.py has `best`.
 """
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

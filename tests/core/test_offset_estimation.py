@@ -4,8 +4,6 @@ The plants are independent of the package: a tip rests until a contact moves it.
 shows it 80 ms late.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 

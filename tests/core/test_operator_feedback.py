@@ -1,7 +1,5 @@
 """Profile `best` with an operator in the loop, who corrects the observed tip error with a delay."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The play operator, Eq. (1), against the centred backlash of python-control."""
 
-from __future__ import annotations
-
 import control
 import numpy as np
 import pytest

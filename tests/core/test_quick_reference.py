@@ -1,7 +1,5 @@
 """An operator's flicks are followed at the speed limit and never stop motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

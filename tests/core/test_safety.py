@@ -4,8 +4,6 @@ The instrument is three simulated plays in the images of an ideal camera with no
 the largest distance of the tip from that of an identical run without the fault.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from simulated_plays import (

@@ -1,7 +1,5 @@
 """Sign convention of the offsets (decision 0001): the article's printed signs do not converge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """State estimation, Eqs. (13)-(16), against numpy's pseudo-inverse, and its rank check."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tautscope import _core

@@ -1,7 +1,5 @@
 """State prediction for the marker detection, and the standard deviation of the state estimate."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from types import SimpleNamespace

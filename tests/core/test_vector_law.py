@@ -1,7 +1,5 @@
 """Vector law of profile `best`: bounds of the commands, whatever images and references are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

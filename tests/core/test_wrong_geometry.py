@@ -1,7 +1,5 @@
 """Profile `best` where the geometry is not as configured: visible bands are not refused for it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """A bus that records frames, and a fieldbus on it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 

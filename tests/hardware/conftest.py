@@ -1,7 +1,5 @@
 """Fixtures: a CAN bus with simulated drives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Settings of three drives for tests; long timeouts, for a busy computer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from tautscope.config import DrivesConfig, from_document

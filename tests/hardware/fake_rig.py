@@ -1,7 +1,5 @@
 """A hardware rig with fake motors and a fake camera."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from typing import Any, Self

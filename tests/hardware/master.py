@@ -1,7 +1,5 @@
 """A process that moves the motors until it is ended; started by test_processes.py."""
 
-from __future__ import annotations
-
 import json
 import sys
 import time

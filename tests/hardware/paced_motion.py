@@ -1,7 +1,5 @@
 """Motions of drives under test, and what every family of motors on a line does."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

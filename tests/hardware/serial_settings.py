@@ -1,7 +1,5 @@
 """Settings of motors behind a microcontroller for tests, and the tools that some tests need."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Settings of three servos for tests; long timeouts, for a busy computer."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

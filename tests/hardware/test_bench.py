@@ -1,7 +1,5 @@
 """The bench: the twin behind a CAN bus and a camera stream, in this process and in its own."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Calibration over the bus and the video stream of the bench."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

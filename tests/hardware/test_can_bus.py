@@ -1,7 +1,5 @@
 """The CAN bus between processes, also as an interface of python-can."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable

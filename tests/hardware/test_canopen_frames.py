@@ -12,8 +12,6 @@ Elmo2  Elmo MAN-CAN402IG 1.2, pages 27 (controlword) and 86 (0x60C2)
 Vect   Bonfiglioli Active, CANopen, 8.1.9 (0x1016)
 """
 
-from __future__ import annotations
-
 import pytest
 from bus_transcript import frame, open_transcript
 from drive_settings import drives_config

@@ -6,8 +6,6 @@ S300   Kollmorgen S300-S700 CANopen, December 2019, pages 52 and 134
 Bmx    Baumueller b maXX 1000 parameter manual 5.07004.03, B.3, page 182
 """
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

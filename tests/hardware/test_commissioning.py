@@ -1,7 +1,5 @@
 """Missing and unsuitable drives are refused before a motor is enabled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drives under the console: enabling needs the page's presence, STOP is a quick stop."""
 
-from __future__ import annotations
-
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator

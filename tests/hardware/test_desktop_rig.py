@@ -1,7 +1,5 @@
 """The desktop rig: its configuration is that of its CAD; its protocol on the simulated bus."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

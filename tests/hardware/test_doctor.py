@@ -1,7 +1,5 @@
 """`tautscope doctor` with a rig, a wrong one, and none; no drive is ever enabled."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

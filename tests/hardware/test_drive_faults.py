@@ -1,7 +1,5 @@
 """Every fault ends in a quick stop of all motors and an error with a remedy."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

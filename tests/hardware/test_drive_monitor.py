@@ -1,7 +1,5 @@
 """What following errors do not show: a jump among the recent commands, answers that are late."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from drive_settings import drives_config

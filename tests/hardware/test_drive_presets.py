@@ -1,7 +1,5 @@
 """Presets of makers' drives, with simulated drives that differ as their sources say."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, get_args

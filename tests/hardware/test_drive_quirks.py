@@ -1,7 +1,5 @@
 """Drives that differ from CiA 402 but work: accepted, or refused with the waiver as remedy."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """A trial of benchmarks/drives finds what moved after a fault, and judges how it ended."""
 
-from __future__ import annotations
-
 import pytest
 from drives.__main__ import run, with_motors
 from drives.faults import FAULTS, Fault, setpoints

@@ -1,7 +1,5 @@
 """Drives on the bus start, follow commands, and stop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

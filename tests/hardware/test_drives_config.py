@@ -1,7 +1,5 @@
 """Validation of the section [drives], and conversion of units."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

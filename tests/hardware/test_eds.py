@@ -1,7 +1,5 @@
 """EDS files of manufacturers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from contextlib import closing

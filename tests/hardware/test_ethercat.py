@@ -4,8 +4,6 @@
 PDO 0x1600 and 0x1A00.
 """
 
-from __future__ import annotations
-
 import struct
 import tempfile
 from pathlib import Path

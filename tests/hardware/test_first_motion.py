@@ -1,7 +1,5 @@
 """The configurations of docs/hardware.md: short, and a first motion on simulated motors."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Property tests of the following error monitor."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

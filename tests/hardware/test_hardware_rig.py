@@ -1,7 +1,5 @@
 """The hardware rig with fake motors and a fake camera; no test asserts real times."""
 
-from __future__ import annotations
-
 import itertools
 import signal
 import threading

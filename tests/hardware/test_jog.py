@@ -1,7 +1,5 @@
 """The command `tautscope jog`, on simulated drives."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Stress tests with arbitrary CAN frames."""
 
-from __future__ import annotations
-
 import struct
 from contextlib import suppress
 

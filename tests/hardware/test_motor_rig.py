@@ -1,7 +1,5 @@
 """A robot with [[dof]] whose motors are those of section [drives], on every protocol."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """No command of the loop is faster than the motors can be, which would refuse it."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A tip behind backlash passes; the tip of a wrongly configured motor does not."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from types import SimpleNamespace

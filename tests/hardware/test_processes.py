@@ -1,7 +1,5 @@
 """Drives and master in two processes: the motors stop however either ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

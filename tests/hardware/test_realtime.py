@@ -1,7 +1,5 @@
 """Real-time settings, as the kernel reports them."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

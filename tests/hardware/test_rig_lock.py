@@ -1,7 +1,5 @@
 """One master per bus: hazard M1."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

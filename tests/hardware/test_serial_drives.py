@@ -1,7 +1,5 @@
 """Motors behind a microcontroller: units, limits; faults end in a named error and a stop."""
 
-from __future__ import annotations
-
 import os
 import termios
 from functools import partial

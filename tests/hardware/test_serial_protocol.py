@@ -1,7 +1,5 @@
 """The serial line protocol: the host's frames and simulated board against the header in C."""
 
-from __future__ import annotations
-
 import binascii
 import ctypes
 import random

@@ -1,7 +1,5 @@
 """The bench on a serial line: the twin behind a pseudo-terminal, in a process of its own."""
 
-from __future__ import annotations
-
 import json
 import signal
 import time

@@ -1,7 +1,5 @@
 """Servos behind `Drives`: units, turns, settings; faults end in a named error and a stop."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 from pathlib import Path

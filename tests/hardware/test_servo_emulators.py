@@ -3,8 +3,6 @@
 Addresses are those of the makers' manuals, written out here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

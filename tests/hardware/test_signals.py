@@ -1,7 +1,5 @@
 """POSIX signals end a process only after its motors have stopped."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

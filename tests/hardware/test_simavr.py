@@ -1,7 +1,5 @@
 """The Arduino sketch, compiled with Arduino's own core, in simavr: in simulated time."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 from pathlib import Path

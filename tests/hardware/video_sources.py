@@ -1,7 +1,5 @@
 """Video sources for tests: FFmpeg's test sources, and DV as in the article's rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 `ros/test` runs the node with the real ones.
 """
 
-from __future__ import annotations
-
 import sys
 from collections import defaultdict
 from types import ModuleType, SimpleNamespace

@@ -1,7 +1,5 @@
 """``tautscope analyze``: models of hysteresis compared on a record of an actuator and its tip."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace

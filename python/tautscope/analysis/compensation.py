@@ -1,7 +1,5 @@
 """What compensation would do: the loop, simulated on many plays that are fitted to a record."""
 
-from __future__ import annotations
-
 import logging
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The loop of N axes for the slack of records: its configuration, and a program that runs it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

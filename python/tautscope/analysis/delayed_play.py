@@ -1,7 +1,5 @@
 """Plays of a delayed command, fitted to a record: gain, offset and drift by least squares."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The slack in each episode of a data set, and over all of them."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections import Counter

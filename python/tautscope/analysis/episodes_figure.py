@@ -1,7 +1,5 @@
 """The slack in each episode of a data set, as a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What is wrong with the samples of a record: found, named with its lines, and left out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

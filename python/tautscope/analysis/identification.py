@@ -8,8 +8,6 @@ P is the mean of plays whose half widths lie evenly in r (1 - k) .. r (1 + k): k
 Eq. (1), k = 1 a loop without corners; in full strokes the loop is 2 r wide. A pure delay is r = 0.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

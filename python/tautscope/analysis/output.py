@@ -1,7 +1,5 @@
 """The files of an analysis: compensator, verdict and models as figures, samples as CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The motion behind a command that is logged in steps: setpoints, counts, bursts of samples."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

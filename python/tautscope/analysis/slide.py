@@ -1,7 +1,5 @@
 """The figure of a verdict, for a slide: the loop with its width, and the tip over time."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import Any
 

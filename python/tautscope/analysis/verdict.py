@@ -1,7 +1,5 @@
 """The answer to a record: slack, how sure, what compensation would do, what to do next."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -5,8 +5,6 @@ reads faults from its standard input, one per line (``freeze rotation``, ``clear
 events as JSON lines, and ends with its input, as ``tautscope bench``.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

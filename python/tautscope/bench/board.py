@@ -1,7 +1,5 @@
 """A calibration board that is moved in front of the bench's camera."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -8,8 +8,6 @@ A frame on the socket has the 16 bytes of SocketCAN's ``struct can_frame``: iden
 (u32), length (u8), three unused bytes, eight data bytes.
 """
 
-from __future__ import annotations
-
 import os
 import selectors
 import socket

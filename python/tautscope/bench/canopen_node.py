@@ -4,8 +4,6 @@ It shares the table of objects with `tautscope.hardware`, but no protocol code. 
 no clock: the caller passes frames and the time.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A simulated CiA 402 drive."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable

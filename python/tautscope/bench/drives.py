@@ -3,8 +3,6 @@
 with Hub(path), LocalBus(path) as bus, SimulatedDrives(bus, truth, plant) as drives: ...
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import time

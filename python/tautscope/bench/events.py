@@ -1,7 +1,5 @@
 """Events of the bench, printed as JSON lines."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Callable

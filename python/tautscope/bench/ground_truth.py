@@ -1,7 +1,5 @@
 """A file of the true tip state of the bench's instrument, for evaluation only."""
 
-from __future__ import annotations
-
 from collections import deque
 from pathlib import Path
 from typing import Self

@@ -4,8 +4,6 @@ The motors move by themselves, as long as they have power: after each cycle of a
 clock when no client cycles.
 """
 
-from __future__ import annotations
-
 import fcntl
 import heapq
 import itertools

@@ -3,8 +3,6 @@
 with SimulatedMicrocontroller(config, plant): ...  # a client opens drives.channel
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

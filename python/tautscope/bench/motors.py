@@ -1,7 +1,5 @@
 """What all simulated motors have in common: a thread, a plant, faults on request, events."""
 
-from __future__ import annotations
-
 import threading
 import time
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """What the process of a bench waits for: requests on its standard input, and errors of threads."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

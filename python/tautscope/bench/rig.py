@@ -5,8 +5,6 @@
 Another process drives it through a CAN bus or a serial line, and a socket of images.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """A simulated microcontroller that speaks the serial line protocol, docs/serial.md."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from tautscope.hardware.serial_line import frames

@@ -1,7 +1,5 @@
 """A simulated servo: its memory, its motion and its faults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from tautscope.config import AxisConfig

@@ -3,8 +3,6 @@
 Sources: ROBOTIS, DYNAMIXEL Protocol 2.0; Feetech, communication protocol of the SCS series.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 PING, READ, WRITE, REG_WRITE, ACTION = 1, 2, 3, 4, 5

@@ -3,8 +3,6 @@
 with SimulatedServos(config, plant): ...  # a client opens drives.channel as a serial port
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """``tautscope analyze`` of a data set with many episodes."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

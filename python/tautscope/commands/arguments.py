@@ -1,7 +1,5 @@
 """Options and number types that several verbs share."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import re

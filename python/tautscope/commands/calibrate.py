@@ -1,7 +1,5 @@
 """The command ``tautscope calibrate``: one file per kind of calibration."""
 
-from __future__ import annotations
-
 from tautscope.commands import (
     arguments,
     calibrate_all,

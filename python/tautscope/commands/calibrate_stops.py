@@ -1,7 +1,5 @@
 """The command ``tautscope calibrate stops``."""
 
-from __future__ import annotations
-
 import argparse
 
 from tautscope.commands import arguments

@@ -1,7 +1,5 @@
 """Options that every kind of ``tautscope calibrate`` has, and the output of its result."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A calibration of all kinds in sequence: its state, which survives an interruption, and report."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The steps of ``tautscope calibrate all``: each turns a configuration into a result."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 from collections.abc import Callable

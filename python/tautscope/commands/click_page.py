@@ -1,7 +1,5 @@
 """A page in which a person clicks on the bands of an image."""
 
-from __future__ import annotations
-
 import base64
 import shlex
 from html import escape

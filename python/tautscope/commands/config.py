@@ -1,7 +1,5 @@
 """The command ``tautscope config``."""
 
-from __future__ import annotations
-
 import argparse
 
 from tautscope.commands import arguments

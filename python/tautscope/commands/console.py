@@ -1,7 +1,5 @@
 """The command ``tautscope console``."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

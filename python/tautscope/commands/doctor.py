@@ -1,7 +1,5 @@
 """The command ``tautscope doctor``."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 from collections.abc import Callable, Iterator

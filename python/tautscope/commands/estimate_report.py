@@ -1,7 +1,5 @@
 """Output of ``tautscope replay``: the estimates as a table or as JSON."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The command ``tautscope run``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 

@@ -1,7 +1,5 @@
 """Images and motor positions of a log, or of a video with a table, for calibration."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command ``tautscope report``: tables and figures of a stored run."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The results of a recorded run as printed lines."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The rig that the options of a command name: the only place that chooses one."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """``tautscope demo --robot`` and ``tautscope run --rig``: an operator's motion on any robot."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The command ``tautscope ros2``."""
 
-from __future__ import annotations
-
 import argparse
 
 from tautscope.commands import arguments

@@ -1,7 +1,5 @@
 """Protocols of ``tautscope run``: the article's experiment, and that of the desktop rig."""
 
-from __future__ import annotations
-
 import argparse
 import datetime
 import json

@@ -8,8 +8,6 @@ loop that hangs. An interface that echoes its own frames cannot be used: the ech
 second master.
 """
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -12,8 +12,6 @@ Emergency objects (080+node), heartbeats (700+node) and frames that only another
 checked as they are read.
 """
 
-from __future__ import annotations
-
 import struct
 import time
 from abc import ABC, abstractmethod

@@ -3,8 +3,6 @@
 Source: CiA 402-2 (IEC 61800-7-201), as reproduced in Elmo MAN-CAN402IG 1.2.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum, StrEnum
 
 

@@ -1,7 +1,5 @@
 """CiA 402 drives: state transitions from enabling over set-points to quick stop."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

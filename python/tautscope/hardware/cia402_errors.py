@@ -1,7 +1,5 @@
 """Errors of CiA 402 drives, with what to do about each."""
 
-from __future__ import annotations
-
 from tautscope.config.drives import waiver_hint
 from tautscope.errors import DriveError, ModeRefusedError, SilentDriveError, StateError
 from tautscope.hardware import cia402

@@ -6,8 +6,6 @@ use the default units of CiA 402: positions in counts, velocities in counts per 
 `drives.waive` has 607F.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 

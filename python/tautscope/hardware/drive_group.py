@@ -1,7 +1,5 @@
 """The interface of the drives of a rig, whatever their protocol."""
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable

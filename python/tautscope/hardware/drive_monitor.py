@@ -1,7 +1,5 @@
 """Checks of what drives report, whatever their protocol: timeliness, following error."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ but the types of objects that are used, vendor and product number is read, so th
 can make a file unusable.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

@@ -7,8 +7,6 @@ Tested against a fake of `pysoem.Master` only. The drives are synchronised by th
 process data, not by distributed clocks.
 """
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Callable, Mapping, Sequence

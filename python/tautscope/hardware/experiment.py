@@ -1,7 +1,5 @@
 """The article's experiment on a physical rig: ``tautscope run``."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from functools import partial

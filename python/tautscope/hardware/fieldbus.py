@@ -1,7 +1,5 @@
 """The interface between the drive logic and the fieldbus that connects the drives."""
 
-from __future__ import annotations
-
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Supervision of the following error, in software."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A slow motion of one motor out and back, to check signs and distances of a rig."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A rig of the motors of section ``drives``, with any sensors."""
 
-from __future__ import annotations
-
 import logging
 from bisect import bisect_right
 from collections import deque

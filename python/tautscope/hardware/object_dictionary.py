@@ -3,8 +3,6 @@
 The table replaces the EDS file of a drive where the configuration names none.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Plausibility of tip and motor motion: finds wrong signs, units and broken transmissions."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

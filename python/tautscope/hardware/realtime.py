@@ -1,7 +1,5 @@
 """Real-time settings of a process: SCHED_FIFO priorities, locked memory, garbage collection."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

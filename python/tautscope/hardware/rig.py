@@ -1,7 +1,5 @@
 """A rig of drives and a live camera, in a laboratory or on the bench."""
 
-from __future__ import annotations
-
 import logging
 import time
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """One master per bus: a lock that ends with the process, however it ends."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Results of ``tautscope run``, and its run folder."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import dataclass

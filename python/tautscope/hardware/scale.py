@@ -1,7 +1,5 @@
 """Conversion between SI units and the counts of an encoder, and the limits of a command."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

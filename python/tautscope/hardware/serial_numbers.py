@@ -1,7 +1,5 @@
 """Serial numbers of the camera and the drives of a rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tautscope.config import CameraConfig, Config

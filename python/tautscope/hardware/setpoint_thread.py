@@ -1,7 +1,5 @@
 """A thread that sends set-points to the drives at a constant rate."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

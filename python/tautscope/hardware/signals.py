@@ -1,7 +1,5 @@
 """POSIX signals: a process that is asked to end stops its motors first."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping

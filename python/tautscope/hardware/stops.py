@@ -1,7 +1,5 @@
 """Search for the mechanical stops of a motor, at low torque."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

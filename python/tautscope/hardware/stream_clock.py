@@ -1,7 +1,5 @@
 """Capture times from the time stamps of a video source."""
 
-from __future__ import annotations
-
 from collections import deque
 
 from tautscope.config import SourceConfig

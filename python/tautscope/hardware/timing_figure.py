@@ -1,7 +1,5 @@
 """The figure of how punctual a run on hardware was."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """Delay between motors and images of a record: a log, or a video with motor positions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 

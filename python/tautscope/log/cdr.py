@@ -1,7 +1,5 @@
 """Messages of ROS 2 Jazzy, their definitions, and CDR, by rosbags."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping
 from functools import cache

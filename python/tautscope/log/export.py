@@ -1,7 +1,5 @@
 """Repair of truncated logs, and export as CSV or as a rosbag2 folder."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import dataclass

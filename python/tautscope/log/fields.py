@@ -1,7 +1,5 @@
 """Fields of messages that logs and the ROS 2 node have, in their ROS 2 types."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The messages at the start of a log: configuration, run, versions and camera."""
 
-from __future__ import annotations
-
 import json
 import platform
 import tomllib

@@ -4,8 +4,6 @@ PNG is lossless. Viewers show BGR, RGB and BGRA correctly; images in YUV formats
 images of their bytes.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

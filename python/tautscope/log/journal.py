@@ -1,7 +1,5 @@
 """Queues of what is to be recorded, and the two threads that encode and write it."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections import Counter, deque

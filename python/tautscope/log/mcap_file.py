@@ -4,8 +4,6 @@ The records are those of the `mcap` library. Its own writer compresses with zstd
 images takes six times as long as level 1 and gives larger files (decision 0020).
 """
 
-from __future__ import annotations
-
 import zlib
 from collections import Counter
 from typing import IO

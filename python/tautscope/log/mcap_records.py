@@ -1,7 +1,5 @@
 """Records and messages of an MCAP file that may be truncated or damaged."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO

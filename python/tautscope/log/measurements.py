@@ -1,7 +1,5 @@
 """Measurements of a log: conversion of a `Tip`, `Pose` or `Points` to messages, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any

@@ -4,8 +4,6 @@ Header stamps are wall clock times [ns]; times of the rig's clock, which a repla
 float64 fields.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Reading a log, complete or truncated."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property

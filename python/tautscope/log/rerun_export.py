@@ -1,7 +1,5 @@
 """Export of a log as a recording for the Rerun viewer."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from os import PathLike

@@ -1,7 +1,5 @@
 """A run as it is stored: a log, a run folder, or a folder of tables."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path

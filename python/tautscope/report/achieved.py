@@ -1,7 +1,5 @@
 """What the compensation of a run without an end achieved in the last minutes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A film of one motion without and with compensation, side by side, in the twin's camera."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figure and overlay video of a geometry calibration."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

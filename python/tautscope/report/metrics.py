@@ -3,8 +3,6 @@
 Arrays in, numbers out. A figure that the data do not determine is NaN.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Tracking of an operator motion: all DOFs at once, judged by the true tip where it is known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

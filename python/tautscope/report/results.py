@@ -1,7 +1,5 @@
 """Table 1 of a run: the figures of merit per DOF; their median and worst value over seeds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeVar

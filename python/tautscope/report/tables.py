@@ -1,7 +1,5 @@
 """Table 1 with the article's values, and the table of the operator motion: text, CSV, JSON."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence

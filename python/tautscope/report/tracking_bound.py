@@ -3,8 +3,6 @@
 It shares no code with the compiled laws, so that tests can compare them with it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

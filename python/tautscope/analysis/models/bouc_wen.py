@@ -1,7 +1,5 @@
 """Bouc-Wen model in normalised, rate-independent form, fitted by nonlinear least squares."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 import numpy as np

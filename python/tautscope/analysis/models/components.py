@@ -4,8 +4,6 @@ All quantities are normalised: the command's range in the first half is 1 with 0
 tip's is 1 with 0 at its mean, and its direction is that of the command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property

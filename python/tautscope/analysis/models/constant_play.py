@@ -1,7 +1,5 @@
 """A play with constant contact offsets, Eq. (1), fitted off-line."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 import numpy as np

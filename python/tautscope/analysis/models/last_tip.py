@@ -1,7 +1,5 @@
 """Two trivial predictors: the last measured tip, and that plus gain times command change."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tautscope.analysis.models.task import Floats, Prediction, Task, last_seen

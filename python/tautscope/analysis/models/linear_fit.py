@@ -1,7 +1,5 @@
 """A straight line between command and tip: no hysteresis."""
 
-from __future__ import annotations
-
 from tautscope.analysis.models.task import Prediction, Task, fit_line
 
 

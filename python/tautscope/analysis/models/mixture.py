@@ -1,7 +1,5 @@
 """Weighted mixture of models: profile ``best``'s filter, other models of hysteresis, and none."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``best``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Prandtl-Ishlinskii: a superposition of plays, weights by non-negative least squares."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 import numpy as np

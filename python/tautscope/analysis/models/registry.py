@@ -1,7 +1,5 @@
 """The models that `tautscope analyze` compares, in the order of its table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Input and output of a model, and the least squares that several models share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Linear regression of the tip whose coefficients are tracked by Kalman filters."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tautscope._core import track_coefficients

@@ -1,7 +1,5 @@
 """Checks of the calibration: what was never calibrated, or belongs to another device or state."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Checks of cameras: V4L2 devices, and the frames of the configured source."""
 
-from __future__ import annotations
-
 import math
 import os
 import statistics

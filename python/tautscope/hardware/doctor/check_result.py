@@ -1,7 +1,5 @@
 """Results of checks, for people and for scripts."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Checks of the computer: libraries, real-time priority, locked memory, disk."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform

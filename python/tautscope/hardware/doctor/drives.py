@@ -1,7 +1,5 @@
 """Checks of the bus and the drives: configured as before a run, never enabled."""
 
-from __future__ import annotations
-
 import logging
 import statistics
 import time

@@ -1,7 +1,5 @@
 """Checks of a rig of one's own, which is reset and then held where it is."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

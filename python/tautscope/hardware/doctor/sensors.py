@@ -1,7 +1,5 @@
 """Checks of what the sensors of a rig measured while it was held."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Frames and messages of the serial line protocol, version 1, as docs/serial.md has them."""
 
-from __future__ import annotations
-
 import binascii
 import struct
 from collections.abc import Iterator, Sequence

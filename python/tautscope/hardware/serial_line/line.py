@@ -1,7 +1,5 @@
 """A serial port with a microcontroller: requests, and the answers to them."""
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import Any

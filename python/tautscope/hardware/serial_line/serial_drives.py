@@ -5,8 +5,6 @@ positions and the state. The microcontroller stops the motors by itself if no se
 `heartbeat_timeout` (docs/serial.md).
 """
 
-from __future__ import annotations
-
 import struct
 import time
 from typing import Any

@@ -4,8 +4,6 @@ Sources: the e-manual of Dynamixel X (control table, protocol 2.0) and Feetech's
 SMS and STS series. Not run on a servo.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

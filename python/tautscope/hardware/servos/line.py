@@ -1,7 +1,5 @@
 """A serial line of servos, through `rustypot`, with the errors of this package."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """One servo on a line: its registers, settings and faults."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ families only Dynamixel stops by itself when packets are missing (bus watchdog,
 `heartbeat_timeout`); docs/hardware.md says what moves after the end of the host.
 """
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 
