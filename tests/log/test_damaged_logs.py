@@ -1,5 +1,6 @@
 """Truncated and damaged logs, and files that are not logs."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -120,8 +121,9 @@ def test_files_that_are_not_logs_are_rejected(tmp_path: Path, recorded: Recorded
 
 
 def test_a_folder_in_place_of_a_log_is_answered_with_its_log(
-    recorded: Recorded, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, recorded: Recorded, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    log = Path(shutil.copy(recorded[0], tmp_path / "run.mcap"))
     for verb, *option in (["replay"], ["recover"], ["export", "--csv"], ["export", "--rosbag=b"]):
-        assert main([verb, str(recorded[0].parent), *option]) == 2
-        assert f"an MCAP file, such as {recorded[0]}" in capsys.readouterr().err
+        assert main([verb, str(tmp_path), *option]) == 2
+        assert f"an MCAP file, such as {log}" in capsys.readouterr().err
