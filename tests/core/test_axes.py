@@ -512,6 +512,23 @@ def test_motion_within_the_slack_does_not_move_a_tip_that_is_measured_without_no
     assert loop.supervision.latched == ()
 
 
+def test_one_value_that_is_stuck_is_left_out() -> None:
+    """An encoder of two is unplugged: its degree of freedom is not worse off."""
+
+    def look(loop: HysteresisReduction, tip: Floats, at: float) -> None:
+        first, second = tip + 0.002 * np.sin([500 * at, 700 * at])
+        loop.on_tip([0.123 if at > 10 else first, second], at)
+
+    errors = []
+    for compensate in (False, True):
+        loop = HysteresisReduction(axes(2, width_limit=0.9), compensate)
+        errors.append(operate(loop, Plays([0.6, 0.6]), look, seconds=100.0, amplitude=1.5))
+        assert "unobservable" in loop.supervision.latched
+    without, with_it = errors
+    assert with_it[0] < 0.4 * without[0]
+    assert with_it[1] < 0.1 * without[1]
+
+
 def test_a_tracker_that_repeats_its_value_is_frozen() -> None:
     loop, plant = HysteresisReduction(axes(1, width_limit=1.0)), Plays([0.5])
     for tick in range(6000):

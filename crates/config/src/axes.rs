@@ -60,7 +60,8 @@ pub struct AxesSettings {
     pub insertion: core::DofSettings,
 }
 
-type Axes<P, const N: usize> = core::HysteresisReduction<P, Vec<core::Entry<N>>, (), N>;
+type Axes<P, const N: usize> =
+    core::HysteresisReduction<P, Vec<core::Entry<N>>, core::Repeats<N>, N>;
 type PaperOf<const N: usize> = core::Paper<N, core::StateFromSensor<N>>;
 type BestOf<const N: usize, const D: usize> = core::Best<N, N, 0, D>;
 

@@ -75,7 +75,7 @@ pub use estimation::history::{Entry, history_entries};
 pub use law::settings::LawSettings;
 pub use r#loop::any_loop::{BandLoop, DOFS, Loop};
 pub use r#loop::axes::{
-    Axes, AxesReport, Predict, Reading, SensorProfile, StateFromSensor, VALUES,
+    Axes, AxesReport, Predict, Reading, Repeats, SensorProfile, StateFromSensor, VALUES,
 };
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;

@@ -18,11 +18,8 @@ use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
-use crate::supervision::frame_gate::ImageIdentity;
 use crate::supervision::monitors::SENSORS;
-
-/// Most values of a measurement.
-pub const VALUES: usize = 16;
+pub use crate::supervision::repeat::{Repeats, VALUES};
 
 /// Standard deviation by a measurement alone, in units, up to which it determines a DOF.
 const OBSERVABLE: f64 = 0.5;
@@ -105,7 +102,7 @@ pub trait SensorProfile<const N: usize>: Profile<N> {
 }
 
 impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
-    HysteresisReduction<P, S, (), N>
+    HysteresisReduction<P, S, Repeats<N>, N>
 {
     /// A loop at rest, with storage for at least `control.history`.
     ///
@@ -113,19 +110,25 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
     /// A setting is out of range, or the storage is too small.
     pub fn of_axes(settings: &LoopSettings<N>, storage: S) -> Result<Self, ConfigError> {
         const { assert!(N >= 1 && N <= DOFS) };
-        Self::with_profile(settings, |limits| P::of_axes(settings, limits), (), storage)
+        let make = |limits| P::of_axes(settings, limits);
+        Self::with_profile(settings, make, Repeats::default(), storage)
     }
 }
 
 impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> Axes
-    for HysteresisReduction<P, S, (), N>
+    for HysteresisReduction<P, S, Repeats<N>, N>
 {
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport {
-        let mut covariance = [0.0; VALUES * VALUES];
+        let (mut values, mut covariance) = ([0.0; VALUES], [0.0; VALUES * VALUES]);
+        let is_stuck = self.leave_out_stuck(reading, &mut values);
+        let known = values.get(..reading.values.len());
+        let reading = &Reading {
+            values: known.filter(|_| !is_stuck).unwrap_or(reading.values),
+            ..*reading
+        };
         let reading = &self.weighed(reading, &mut covariance);
         self.check_start(reading);
-        let identity = identity(reading.values);
-        let outcome = self.update_by(reading, reading.captured_at, reading.sensor, identity);
+        let outcome = self.update_by(reading, reading.captured_at, reading.sensor, None, is_stuck);
         let Outcome {
             status,
             past,
@@ -155,7 +158,7 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
 }
 
 impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
-    HysteresisReduction<P, S, (), N>
+    HysteresisReduction<P, S, Repeats<N>, N>
 {
     /// Compares the command with the tip by a measurement alone, whether it is used or refused, until the direction is known.
     fn check_start(&mut self, reading: &Reading<'_>) {
@@ -184,7 +187,43 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
     }
 }
 
-impl<P, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> HysteresisReduction<P, S, (), N> {
+impl<P, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
+    HysteresisReduction<P, S, Repeats<N>, N>
+{
+    /// The values (m,) of a reading, with NaN for those that are stuck; whether all are.
+    fn leave_out_stuck(&mut self, reading: &Reading<'_>, values: &mut [f64; VALUES]) -> bool {
+        let (Some(past), true) = (
+            self.history.at(reading.captured_at),
+            reading.is_consistent(),
+        ) else {
+            return false;
+        };
+        let Some(travel) = self.monitors.frozen_travel() else {
+            return false;
+        };
+        let at = |state| Sensor::<N, VALUES, 0>::features(reading, &state, &[]);
+        let change = |index: usize, from| {
+            let ((now, by), (then, _)) = (at(past.command)?, at(from)?);
+            let parts = by.iter().zip(travel);
+            let most = parts.map(|(by, travel)| by.get(index).map_or(0.0, |by| by.abs() * travel));
+            Some((now.get(index)? - then.get(index)?).abs() > most.sum())
+        };
+        let stuck = self.view.update(
+            reading.sensor,
+            reading.values,
+            past.command,
+            |index, from| change(index, from).unwrap_or(false),
+        );
+        let all = values.iter_mut().zip(reading.values).zip(stuck);
+        all.for_each(|((to, value), stuck)| *to = if stuck { f64::NAN } else { *value });
+        let mut known = reading
+            .values
+            .iter()
+            .zip(stuck)
+            .filter(|(value, _)| value.is_finite());
+        stuck.contains(&true) && known.all(|(_, stuck)| stuck)
+    }
+
     /// A reading with the covariance that its sensor has shown to have.
     fn weighed<'a>(&mut self, reading: &Reading<'a>, covariance: &'a mut [f64]) -> Reading<'a> {
         let past = self.history.at(reading.captured_at);
@@ -497,11 +536,4 @@ fn least_squares<const N: usize>(
         *std = f64::NAN;
     }
     Some(((state + step).into(), std))
-}
-
-/// A checksum of the bits of values (Fowler, Noll, Vo); None without a number.
-fn identity(values: &[f64]) -> Option<ImageIdentity> {
-    let known = values.iter().any(|value| value.is_finite());
-    let mix = |sum: u64, value: &f64| (sum ^ value.to_bits()).wrapping_mul(0x0100_0000_01b3);
-    known.then(|| ImageIdentity::Checksum(values.iter().fold(0xcbf2_9ce4_8422_2325, mix)))
 }

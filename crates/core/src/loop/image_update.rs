@@ -36,20 +36,15 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         captured_at: f64,
         sensor: usize,
         image: Option<ImageIdentity>,
+        is_stuck: bool,
     ) -> Outcome<N, I::View> {
         let past = self.history.at(captured_at);
         let arrival = FrameArrival {
             captured_at,
             now: self.history.newest_time(),
             image,
-            is_whole: I::IS_WHOLE,
-            travel: past.map(|past| {
-                if I::IS_WHOLE {
-                    past.travel
-                } else {
-                    past.command
-                }
-            }),
+            is_stuck,
+            travel: past.map(|past| past.travel),
         };
         let mut raised = self.monitors.check_arrival(&arrival, sensor);
         let outcome = self.examine(observation, captured_at, sensor, past, &mut raised);
@@ -268,7 +263,7 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for Hysteresis
             past,
             seen,
             triggers,
-        } = self.update_by(&bands, captured_at, 0, identity);
+        } = self.update_by(&bands, captured_at, 0, identity, false);
         let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
         let seen = seen.unwrap_or_else(|| self.unseen(predicted_state));
         Report {

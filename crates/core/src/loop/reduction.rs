@@ -14,7 +14,7 @@ use crate::supervision::monitors::{Monitors, SENSORS};
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; measurements update the estimate of the hysteresis.
 ///
 /// `P` is the profile, `Paper` or `Best`; `S` the storage of the latest control ticks, by default of 1.27 s at 5 ms; `V` the
-/// configured view of the instrument, where the loop has one; N the number of DOFs.
+/// configured view of the instrument, or what sensors repeat; N the number of DOFs.
 #[derive(Debug, Clone)]
 pub struct HysteresisReduction<P, S = [Entry; 256], V = FeatureModel, const N: usize = 3> {
     pub(super) profile: P,

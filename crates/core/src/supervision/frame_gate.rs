@@ -1,6 +1,5 @@
 //! Frame gate: whether a frame is used, by its times, by its image, and by the innovation (innovation gate).
 
-use crate::dof::zip_with;
 use crate::error::{ConfigError, require_all_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -24,10 +23,9 @@ pub struct FrameArrival<const N: usize> {
     pub now: f64,
     /// None if neither pixels nor features are known.
     pub image: Option<ImageIdentity>,
-    /// Whether it depends on every DOF and has noise, as an image.
-    pub is_whole: bool,
-    /// Path length of the command at the capture time [m or rad], or if it is not whole the command: within the slack a motor
-    /// moves as often as it likes. None where the history does not reach.
+    /// Whether all that it measures is stuck.
+    pub is_stuck: bool,
+    /// Path length of the command at the capture time [m or rad]. None where the history does not reach.
     pub travel: Option<[f64; N]>,
 }
 
@@ -39,7 +37,7 @@ pub struct FrameArrival<const N: usize> {
 pub struct FrameGate<const N: usize> {
     settings: SafetySettings<N>,
     /// [m or rad], as all lengths below.
-    frozen_travel: [f64; N],
+    pub(super) frozen_travel: [f64; N],
     captured_at: Option<f64>,
     arrived_at: Option<f64>,
     /// The image that frames since then repeat, and the path length of the command then.
@@ -99,8 +97,10 @@ impl<const N: usize> FrameGate<N> {
             return Flags::of(Flag::Clock);
         }
         self.captured_at = Some(captured_at);
-        Flags::when(now - captured_at > self.settings.frame_age, Flag::Late)
-            .union(Flags::when(self.is_frozen(arrival), Flag::Frozen))
+        Flags::when(now - captured_at > self.settings.frame_age, Flag::Late).union(Flags::when(
+            arrival.is_stuck || self.is_frozen(arrival),
+            Flag::Frozen,
+        ))
     }
 
     fn is_frozen(&mut self, arrival: &FrameArrival<N>) -> bool {
@@ -109,14 +109,8 @@ impl<const N: usize> FrameGate<N> {
         };
         match self.repeated {
             Some((repeated, then)) if repeated == image => {
-                let moved = zip_with(travel, then, |now, then| (now - then).abs());
-                let mut dofs = moved.iter().zip(self.frozen_travel);
-                let is_far = |(moved, limit): (&f64, f64)| *moved >= limit;
-                if arrival.is_whole {
-                    dofs.any(is_far)
-                } else {
-                    dofs.all(is_far)
-                }
+                let mut dofs = travel.iter().zip(then).zip(self.frozen_travel);
+                dofs.any(|((now, then), limit)| now - then >= limit)
             }
             _ => {
                 self.repeated = Some((image, travel));

@@ -11,6 +11,7 @@ pub(crate) mod prediction_monitor;
 pub(crate) mod reactions;
 pub(crate) mod reference_gate;
 pub(crate) mod reference_limiter;
+pub(crate) mod repeat;
 pub(crate) mod sensor_fit;
 pub(crate) mod settings;
 pub(crate) mod start_check;

@@ -238,6 +238,12 @@ impl<const N: usize> Monitors<N> {
         self.enabled(Flags::when(is_other, Flag::FrameRate))
     }
 
+    /// Travel of the command (N,) [m or rad] in which what a sensor measures changes; None if that is not checked.
+    pub(crate) fn frozen_travel(&self) -> Option<[f64; N]> {
+        let [gate, ..] = &self.frames;
+        (!self.off.contains(Flag::Frozen)).then_some(gate.frozen_travel)
+    }
+
     /// The variance of one of the sensors over the told one, with the misfit of a measurement of it, if it has any.
     pub(crate) fn fit(&mut self, misfit: Option<f64>, sensor: usize) -> f64 {
         let Some(fit) = self.fits.get_mut(sensor) else {

@@ -1,8 +1,9 @@
 //! The frame gate: times, images and innovations of frames.
 
-use crate::dof::{PerDof, zip_with};
+use crate::dof::PerDof;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, FrameGate, ImageIdentity};
+use crate::supervision::repeat::Repeat;
 use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
@@ -24,7 +25,7 @@ proptest! {
         let mut gate = new_gate();
         let mut travel = UNITS.map(|limit| 3.7 * limit);
         let mut arrive = |image: Option<ImageIdentity>, travel: Option<PerDof<f64>>| {
-            gate.check_arrival(&FrameArrival { captured_at: 1.0, now: 1.0, image, is_whole: true, travel })
+            gate.check_arrival(&FrameArrival { captured_at: 1.0, now: 1.0, image, is_stuck: false, travel })
         };
         let [first, other] = if known {
             [ImageIdentity::Checksum(7), ImageIdentity::Checksum(8)]
@@ -46,30 +47,23 @@ proptest! {
     }
 }
 
-/// A sensor of some DOFs, without noise: only once all have moved farther than any slack.
+/// Farther than any slack from the command since when it repeats, until it changes.
 #[test]
-fn a_measurement_that_is_repeated_is_frozen_once_every_dof_has_moved() {
-    let mut gate = new_gate();
-    let mut arrive = |share: [f64; 3]| {
-        gate.check_arrival(&FrameArrival {
-            captured_at: 1.0,
-            now: 1.0,
-            image: Some(ImageIdentity::Checksum(7)),
-            is_whole: false,
-            travel: Some(zip_with(share, UNITS, |share, unit| share * unit)),
-        })
+fn a_value_is_stuck_once_the_command_would_have_changed_it() {
+    let (mut repeat, limit) = (Repeat::<2>::NEW, 1.5);
+    let mut is_stuck = |value: f64, command: [f64; 2]| {
+        repeat.update(value, command, |from| (command[0] - from[0]).abs() > limit)
     };
     for _ in 0..10 {
-        for share in [
-            [0.0; 3],
-            [-0.9, 0.0, 0.9],
-            [9.0, -9.0, 0.9],
-            [9.0, 0.0, 9.0],
-        ] {
-            assert_eq!(arrive(share), Flags::NONE, "{share:?}");
+        for command in [[0.0; 2], [-1.4, 9.0], [1.4, -9.0]] {
+            assert!(!is_stuck(0.1, command), "{command:?}");
         }
     }
-    assert_eq!(arrive([-1.1, 1.1, 1.1]), Flags::of(Flag::Frozen));
+    assert!(is_stuck(0.1, [1.6, 0.0]));
+    assert!(is_stuck(0.1, [0.0, 0.0]), "it has not moved since");
+    assert!(!is_stuck(0.2, [0.0, 0.0]));
+    assert!(!is_stuck(0.2, [1.4, 0.0]));
+    assert!(is_stuck(0.2, [-1.6, 0.0]));
 }
 
 /// The flags of a frame's times.
@@ -79,7 +73,7 @@ fn arrive(gate: &mut FrameGate<3>, captured_at: f64, now: f64, is_in_history: bo
         captured_at,
         now,
         image: None,
-        is_whole: true,
+        is_stuck: false,
         travel,
     })
 }

@@ -2,7 +2,7 @@
 
 use crate::dof::Friction;
 use crate::estimation::history::Entry;
-use crate::r#loop::axes::{Axes, Predict, Reading, StateFromSensor, VALUES};
+use crate::r#loop::axes::{Axes, Predict, Reading, Repeats, StateFromSensor, VALUES};
 use crate::r#loop::paper::Paper;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
@@ -43,8 +43,10 @@ fn status(values: &[f64], covariance: &[f64], sensor: usize) -> Status {
     };
     let storage = vec![Entry::BLANK; of_bands.history_entries()];
     let mut reduction =
-        HysteresisReduction::<Paper<2, StateFromSensor<2>>, _, (), 2>::of_axes(&settings, storage)
-            .unwrap();
+        HysteresisReduction::<Paper<2, StateFromSensor<2>>, _, Repeats<2>, 2>::of_axes(
+            &settings, storage,
+        )
+        .unwrap();
     for tick in 0..40 {
         let time = PERIOD * f64::from(tick);
         reduction.step([0.0; 2], None, time);
