@@ -53,11 +53,7 @@ CONTROLS = {
     "L2": ["python/tautscope/log/mcap_records.py"],
     "L3": ["python/tautscope/log/cdr.py", "python/tautscope/log/mcap_records.py"],
     "L4": ["python/tautscope/config/section.py"],
-    "N1": [
-        "python/tautscope/console/access.py",
-        "python/tautscope/console/server.py",
-        "python/tautscope/ros2/session.py",
-    ],
+    "N1": ["python/tautscope/console/server.py", "python/tautscope/ros2/session.py"],
     "N2": ["python/tautscope/console/server.py", "python/tautscope/console/pages.py"],
     "N3": [
         "python/tautscope/console/operator_input.py",

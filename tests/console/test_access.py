@@ -10,8 +10,9 @@ from contextlib import suppress
 
 import pytest
 from running import Page, RunningConsole, rests
-from tautscope.console.access import BURST, LARGEST_MESSAGE, RATE, RateLimit
+from tautscope.console.messages import LARGEST_MESSAGE
 from tautscope.console.pages import Pages
+from tautscope.console.server import BURST, RATE, RateLimit
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 

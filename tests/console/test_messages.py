@@ -13,9 +13,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from tautscope.config import Config
 from tautscope.console import messages as msg
-from tautscope.console.access import LARGEST_MESSAGE
-from tautscope.console.shared import Channels, SharedMemory
-from tautscope.console.slots import Slots
+from tautscope.console.messages import LARGEST_MESSAGE
+from tautscope.console.shared import Channels, SharedMemory, Slots
 
 NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([2**53, -1, 1e308]))
 VALUES = st.recursive(

@@ -18,7 +18,7 @@ from tautscope.console.operator_input import (
     LARGEST_SPEED,
     OperatorInput,
 )
-from tautscope.console.programs import experiment, home, sweep
+from tautscope.console.programs import PROGRAMS, program
 from tautscope.dof import Dof
 
 CONFIG = load_config().replace(
@@ -256,15 +256,15 @@ def test_clutch_scale_and_travel() -> None:
     assert not moved[1:].any()
 
 
-@pytest.mark.parametrize("make", [home, experiment, sweep])
-def test_a_program_ends_where_it_should_and_only_runs_with_the_page(make) -> None:
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_program_ends_where_it_should_and_only_runs_with_the_page(name: str) -> None:
     desk = Desk()
     desk.engage()
     for _ in range(100):
         desk.servo()
         desk.tick()
     desk.servo(is_holding=False)
-    desk.input.program = make(CONFIG, desk.input.reference)
+    desk.input.program = program(name, CONFIG, desk.input.reference)
     largest = np.zeros(3)
     while desk.input.program is not None:
         desk.servo(is_holding=False)
@@ -272,7 +272,7 @@ def test_a_program_ends_where_it_should_and_only_runs_with_the_page(make) -> Non
     assert desk.input.program_ended.endswith(": done")
     assert np.allclose(desk.input.reference, START, atol=SPEED * PERIOD)
     assert (largest <= np.array(CONFIG.safety.reference_speed) * PERIOD).all()
-    desk.input.program = make(CONFIG, START + 0.01)
+    desk.input.program = program(name, CONFIG, START + 0.01)
     desk.servo(is_holding=False)
     last = desk.now
     while desk.input.program is not None:

@@ -14,12 +14,10 @@ import pytest
 from running import small_config
 from tautscope.console import messages as msg
 from tautscope.console.live_twin import LiveTwin
-from tautscope.console.publisher import Update
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.start import web_server
-from tautscope.loop.rig import Frame
 
 
 def wait(condition: Callable[[], bool]) -> None:
@@ -41,7 +39,7 @@ def test_an_image_that_cannot_be_shown_is_told_and_the_next_is_shown(
         session = Session(control, channels)
 
         def show(pixels: np.ndarray) -> None:
-            session._publisher.submit(Update(1, Frame(pixels, 0.0, 1), time.monotonic()))
+            session._publisher.submit(1, pixels, time.monotonic())
 
         def message() -> str:
             session._published_at = 0.0

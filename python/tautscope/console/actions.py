@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tautscope.calibration.images import to_bgr
 from tautscope.console import messages as msg
-from tautscope.console.programs import PROGRAMS, programs_of
+from tautscope.console.programs import PROGRAMS, program, programs_of
 from tautscope.console.rig_control import RigControl
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
@@ -120,7 +120,7 @@ class Actions:
             return "motion is stopped"
         if not operator.is_present(time.monotonic()):
             return "no command for 0.1 s"
-        operator.start(PROGRAMS[name](control.config, operator.reference))
+        operator.start(program(name, control.config, operator.reference))
         return ""
 
     def _end_program(self, _: msg.Action) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.console.uncompensated import (
@@ -24,12 +23,12 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.log.writer import LogWriter
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Rig, Sample
 from tautscope.runs.control_loop import ControlLoop
 
-Floats = NDArray[np.float64]
 LATE = 2.0
 """A tick that begins so many control periods after the last one is late."""
 _TIMES = 200_000

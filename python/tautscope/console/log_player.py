@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 
 from tautscope.console import messages as msg
-from tautscope.console.publisher import Bands, Publisher, Update
+from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
 from tautscope.console.state import ImageState, LogState, blank_state, known, show_truth, values
 from tautscope.console.uncompensated import MODEL, PlayTip, Score
 from tautscope.hardware.signals import exit_on_signals
-from tautscope.log.reader import Log, Request, Tick, read_log
-from tautscope.log.reader import Update as LoggedUpdate
+from tautscope.log.reader import Log, Request, Tick, Update, read_log
 from tautscope.loop.kinematics import build_kinematics
-from tautscope.loop.rig import Frame
 
 STATE_PERIOD = 0.02
 """Time between two states for the page [s]."""
@@ -148,10 +146,10 @@ class LogPlayer:
             if index >= begin or isinstance(event, Request):
                 self._add(index, event)
 
-    def _add(self, index: int, event: Tick | LoggedUpdate | Request) -> None:
+    def _add(self, index: int, event: Tick | Update | Request) -> None:
         if isinstance(event, Tick):
             self._add_tick(event)
-        elif isinstance(event, LoggedUpdate):
+        elif isinstance(event, Update):
             self._add_update(index, event)
         else:
             self._add_request(event)
@@ -174,7 +172,7 @@ class LogPlayer:
         if self._log.config.dof:
             show_truth(state, tick.sample.true_state, self._kinematics)
 
-    def _add_update(self, index: int, update: LoggedUpdate) -> None:
+    def _add_update(self, index: int, update: Update) -> None:
         row: dict[str, Any] = dict(zip(self._log.update_names, update.row, strict=True))
         state, dofs = self._state, self._log.config.dofs
         estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
@@ -190,12 +188,12 @@ class LogPlayer:
         state.image = ImageState(self._images, row["status"], age, updates=self._images)
         state.image.deviation = (None,) * len(dofs)
         if self._log.has_image(index):
-            frame = Frame(self._log.image(index), row["captured_at"], row["sequence"])
             a, b = (math.isfinite(row[f"features_{band}_x"]) for band in "ab")
             reference = np.array(state.reference)
             without = np.array(state.uncompensated, np.float64)
             bands = Bands(estimate, predicted, reference, without, (a, b))
-            self._publisher.submit(Update(self._images, frame, time.monotonic(), bands))
+            image = self._log.image(index)
+            self._publisher.submit(self._images, image, time.monotonic(), bands)
 
     def _add_request(self, request: Request) -> None:
         name, _, value = request.text.partition(" ")

@@ -12,6 +12,8 @@ from msgspec import Meta, Struct
 
 from tautscope._core import MOST_DOFS
 
+LARGEST_MESSAGE = 2048
+"""Longest message that is read [byte]."""
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 """An integer that JavaScript represents exactly."""
 Axis = Annotated[float, Meta(ge=-1, le=1)]

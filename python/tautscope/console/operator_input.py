@@ -17,8 +17,8 @@ from tautscope.console.lease import Lease
 from tautscope.console.messages import Received, Servo
 from tautscope.console.pointing import Point, Pointing
 from tautscope.console.programs import Program, motion_limits
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 COMMAND_TIMEOUT = 0.1
 """Time without an accepted command after which motion by hand stops [s]."""
 IDLE_TIMEOUT = 0.5

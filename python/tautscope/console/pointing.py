@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 Point = tuple[float, float]
 SLOWING_TIME = 0.2
 """Time at full speed to the pixel below which motion slows down [s]; the distance then falls by a

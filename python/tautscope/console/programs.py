@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import Dof
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.references import Motion, Move, SineSequence
 
-Floats = NDArray[np.float64]
 LEAST_TIME = 0.1
 """Shortest duration of a move to the start [s]."""
 MOVE_SPEED = 0.25
@@ -89,34 +88,22 @@ class Program:
         return self._motions[-1](time)
 
 
-def home(config: Config, reference: Floats) -> Program:
-    """A slow move to the start position of the experiment, or the middle of the ranges."""
-    return Program("homing", [_move_to_start(config, reference)])
+PROGRAMS = {"home": "homing", "sweep": "calibration sweep", "experiment": "experiment"}
+"""Names for people by the names of the actions that start them."""
 
 
-def experiment(config: Config, reference: Floats) -> Program:
-    """The article's experiment after a move to its start."""
-    sines = SineSequence(config.experiment)
-    return Program("experiment", [_move_to_start(config, reference), sines])
+def program(name: str, config: Config, reference: Floats) -> Program:
+    """A program of `PROGRAMS`.
 
-
-def sweep(config: Config, reference: Floats) -> Program:
-    """One period of the experiment's sine per DOF, in which the slack is estimated."""
-    sines = SineSequence(config.experiment, periods=1)
-    return Program("calibration sweep", [_move_to_start(config, reference), sines])
-
-
-def _move_to_start(config: Config, reference: Floats) -> Move:
+    ``home`` is a slow move to the start position of the experiment, or the middle of the ranges.
+    After it, ``sweep`` is one period of the experiment's sine per DOF, in which the slack is
+    estimated, and ``experiment`` the article's.
+    """
     limits = motion_limits(config)
-    return Move(reference, limits.start, MOVE_SPEED * limits.speed, LEAST_TIME)
-
-
-PROGRAMS: dict[str, Callable[[Config, Floats], Program]] = {
-    "home": home,
-    "sweep": sweep,
-    "experiment": experiment,
-}
-"""By the names of the actions that start them."""
+    motions: list[Motion] = [Move(reference, limits.start, MOVE_SPEED * limits.speed, LEAST_TIME)]
+    if name != "home":
+        motions.append(SineSequence(config.experiment, 1 if name == "sweep" else None))
+    return Program(PROGRAMS[name], motions)
 
 
 def programs_of(config: Config) -> tuple[str, ...]:

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.console.shared import ImageChannel, Overlay
+from tautscope.console.shared import Image, ImageChannel, Overlay
 from tautscope.console.state import LogState
 from tautscope.hardware.realtime import OTHERS, set_realtime_priority
 from tautscope.loop.construction import build_feature_model
-from tautscope.loop.rig import Frame
+from tautscope.loop.kinematics import Floats
 
-Floats = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 _LOG_PERIOD = 1.0
 """Time between two looks at the size of the log and at the free disk [s]."""
@@ -44,23 +42,6 @@ class Bands:
     found: tuple[bool, bool]
 
 
-@dataclass(frozen=True)
-class Update:
-    """An image update to be shown.
-
-    Attributes:
-        sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
-        frame: The frame.
-        arrived_at: When the control loop got the frame [s, monotonic clock].
-        bands: What is drawn over it; None where nothing is.
-    """
-
-    sequence: int
-    frame: Frame
-    arrived_at: float
-    bands: Bands | None = None
-
-
 class Publisher:
     """Copies images into shared memory in a thread of its own; only the newest is kept.
 
@@ -79,8 +60,8 @@ class Publisher:
         self._model = build_feature_model(config)
         self._size = config.camera.width, config.camera.height
         self._channel = channel
-        self._next: Update | None = None
-        self.image: NDArray[np.uint8] | None = None
+        self._next: tuple[Image, Overlay, Bands | None] | None = None
+        self.image: Image | None = None
         self.failure = ""
         self._wake = threading.Event()
         self._is_closing = False
@@ -90,9 +71,19 @@ class Publisher:
         self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
         self._thread.start()
 
-    def submit(self, update: Update) -> None:
-        """Show an image update, in place of one that still waits."""
-        self._next, self.image = update, update.frame.image
+    def submit(
+        self, sequence: int, image: Image, arrived_at: float, bands: Bands | None = None
+    ) -> None:
+        """Show an image, in place of one that still waits.
+
+        Args:
+            sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
+            image: The image.
+            arrived_at: When the control loop got it [s, monotonic clock].
+            bands: What is drawn over it; None where nothing is.
+        """
+        self._next = image, Overlay(sequence, arrived_at, *self._size), bands
+        self.image = image
         self._wake.set()
 
     def close(self) -> None:
@@ -109,14 +100,16 @@ class Publisher:
             self._wake.clear()
             update, self._next = self._next, None
             if update is not None:
-                self._show(update)
+                self._show(*update)
             if time.monotonic() - checked >= _LOG_PERIOD:
                 checked = time.monotonic()
                 self._check_log(checked)
 
-    def _show(self, update: Update) -> None:
+    def _show(self, image: Image, overlay: Overlay, bands: Bands | None) -> None:
         try:
-            self._channel.write(update.frame.image, self._overlay(update))
+            if bands is not None:
+                self._add_bands(overlay, bands)
+            self._channel.write(image, overlay)
         except Exception as error:  # the next one may be shown
             failure = f"No image is shown: {type(error).__name__}: {error}"
             if failure != self.failure:
@@ -125,17 +118,14 @@ class Publisher:
         else:
             self.failure = ""
 
-    def _overlay(self, update: Update) -> Overlay:
-        overlay = Overlay(update.sequence, update.arrived_at, *self._size)
-        if (bands := update.bands) is not None:
-            measured = zip(self._outlines(bands.estimate), bands.found, strict=False)
-            overlay.measured = [outline for outline, is_found in measured if is_found]
-            overlay.predicted = self._outlines(bands.predicted)
-            overlay.tip = self._tip(bands.estimate)
-            overlay.target = self._tip(bands.reference)
-            overlay.uncompensated = self._outlines(bands.uncompensated)
-            overlay.uncompensated_tip = self._tip(bands.uncompensated)
-        return overlay
+    def _add_bands(self, overlay: Overlay, bands: Bands) -> None:
+        measured = zip(self._outlines(bands.estimate), bands.found, strict=False)
+        overlay.measured = [outline for outline, is_found in measured if is_found]
+        overlay.predicted = self._outlines(bands.predicted)
+        overlay.tip = self._tip(bands.estimate)
+        overlay.target = self._tip(bands.reference)
+        overlay.uncompensated = self._outlines(bands.uncompensated)
+        overlay.uncompensated_tip = self._tip(bands.uncompensated)
 
     def _outlines(self, state: Floats) -> list[list[tuple[float, float]]]:
         bands = self._model.bands(state) if np.isfinite(state).all() else None

@@ -23,20 +23,36 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from tautscope.console import messages as msg
-from tautscope.console.access import (
-    ADDRESS,
-    LARGEST_CONNECTIONS,
-    LARGEST_MESSAGE,
-    TOKEN_TIME,
-    RateLimit,
-)
 from tautscope.console.feeds import ImageFeed, StateFeed
 from tautscope.console.pages import Pages
 from tautscope.console.shared import Channels, SharedMemory
 
 CONTROL, VIDEO = "/control", "/video"
 POLICY_VIOLATION = 1008
+ADDRESS = "127.0.0.1"
+LARGEST_CONNECTIONS = 24
+"""Connections at most, with those that have not sent their token."""
+TOKEN_TIME = 2.0
+"""Time within which a connection has to send the token [s]."""
+RATE, BURST = 150.0, 450.0
+"""Messages per second of one connection on average, and at once."""
 Message = TypeVar("Message")
+
+
+class RateLimit:
+    """A token bucket: `BURST` messages at once, refilled by `RATE` per second."""
+
+    def __init__(self, now: float) -> None:
+        self._left, self._at = BURST, now
+
+    def allows(self, now: float) -> bool:
+        """Whether a message is allowed at a time [s]; counts it."""
+        self._left = min(BURST, self._left + (now - self._at) * RATE)
+        self._at = now
+        if self._left < 1:
+            return False
+        self._left -= 1
+        return True
 
 
 def run_server(memory: SharedMemory, token: str, sockets: list[Any]) -> None:
@@ -80,7 +96,7 @@ class Server:
             "process_request": self._process_request,
             "origins": self._origins,
             "compression": None,
-            "max_size": LARGEST_MESSAGE,
+            "max_size": msg.LARGEST_MESSAGE,
             "max_queue": 64,
             "write_limit": 1 << 16,
             "open_timeout": TOKEN_TIME,

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from tautscope.console import messages as msg
 from tautscope.console.actions import Actions
 from tautscope.console.control_run import ControlRun
-from tautscope.console.publisher import Bands, Publisher, Update
+from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels
@@ -102,11 +102,11 @@ class Session:
             bands = Bands(
                 report.state_estimate, report.predicted_state, run.reference, without, found
             )
-            self._publisher.submit(Update(sequence, frame, arrived_at, bands))
+            self._publisher.submit(sequence, frame.image, arrived_at, bands)
         if self._control.config.dof and (picture := run.sample.frame) is not None:
             self._layout.checked(picture.image)
             self._pictures += 1
-            self._publisher.submit(Update(self._pictures, picture, time.monotonic()))
+            self._publisher.submit(self._pictures, picture.image, time.monotonic())
 
     def _idle_opening(self) -> None:
         self._receive_motion()

@@ -11,9 +11,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from tautscope.config import Config
-from tautscope.console.access import ADDRESS
 from tautscope.console.rig_control import RigControl
-from tautscope.console.server import run_server
+from tautscope.console.server import ADDRESS, run_server
 from tautscope.console.session import Session
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.errors import STOPPED, ConfigError, StateError, may_move

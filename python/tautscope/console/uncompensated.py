@@ -6,9 +6,10 @@ from collections import deque
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from tautscope.loop.kinematics import Floats
+
 MODEL = "the model with the estimated slack"
 SECOND_PLANT = "a second simulated instrument"
 WINDOW = 60
