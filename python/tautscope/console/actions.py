@@ -42,15 +42,15 @@ class Actions:
         if isinstance(inbound, msg.Gone):
             if control.lease.release(inbound.client):
                 control.operator.interrupt("the page is gone")
-                self._control.note(f"page {inbound.client} is gone; the lease is free")
+                control.note(f"page {inbound.client} is gone; the lease is free")
             return None
         client, message = inbound.client, inbound.message
         if isinstance(message, msg.Take):
             control.operator.interrupt("control was taken")
             control.lease.take(client)
-            self._control.note(f"page {client} takes lease {control.lease.number}")
+            control.note(f"page {client} takes lease {control.lease.number}")
             return msg.Reply(client, "take", True)
-        if isinstance(message, msg.Servo | msg.Stop | msg.Seek):
+        if not isinstance(message, msg.Request):
             return None
         what = message.name if isinstance(message, msg.Action | msg.Setting) else "profile"
         self._text = ""
@@ -65,7 +65,7 @@ class Actions:
         else:
             reason = self._execute(message)
         if not reason:
-            self._control.note(f"page {client}: {_described(message)}")
+            control.note(f"page {client}: {_described(message)}")
         return msg.Reply(client, what, not reason, (reason or self._text)[: msg.LONGEST_REASON])
 
     def _execute(self, message: msg.Request) -> str:
@@ -76,8 +76,8 @@ class Actions:
             return self._set_profile(message)
         if message.name in PROGRAMS:
             return self._start_program(message.name)
-        reason: str = getattr(self, f"_{message.name}")(message)
-        return reason
+        reason: str | None = getattr(self, f"_{message.name}")()
+        return reason or ""
 
     def _set(self, setting: msg.Setting) -> str:
         operator = self._control.operator
@@ -123,14 +123,14 @@ class Actions:
         operator.start(program(name, control.config, operator.reference))
         return ""
 
-    def _end_program(self, _: msg.Action) -> str:
-        self._control.operator.interrupt("End program")
-        return ""
+    # Requests by their names; each returns why it cannot be executed, if it cannot.
 
-    def _enable(self, _: msg.Action) -> str:
-        control = self._control
+    def _end_program(self) -> None:
+        self._control.operator.interrupt("End program")
+
+    def _enable(self) -> str:
+        control, run = self._control, self._control.run
         control.operator.enable()
-        run = control.run
         if run is None:
             control.open()
             return control.fault
@@ -140,21 +140,17 @@ class Actions:
             run.loop.engage()
         return ""
 
-    def _acknowledge(self, _: msg.Action) -> str:
+    def _acknowledge(self) -> None:
         self._control.acknowledge()
-        return ""
 
-    def _release(self, _: msg.Action) -> str:
-        control = self._control
-        control.operator.interrupt("control was given up")
-        assert control.lease.holder is not None
-        control.lease.release(control.lease.holder)
-        return ""
+    def _release(self) -> None:
+        self._control.operator.interrupt("control was given up")
+        self._control.lease.take(None)
 
-    def _mark(self, _: msg.Action) -> str:
+    def _mark(self) -> str:
         return "" if self._control.run is not None else "there is no log"
 
-    def _record(self, _: msg.Action) -> str:
+    def _record(self) -> str:
         control, run = self._control, self._control.run
         if run is None:
             return "there is no log"
@@ -171,7 +167,7 @@ class Actions:
         control.note(f"take {self._takes} {'begins' if control.is_recording else 'ends'}")
         return ""
 
-    def _still(self, _: msg.Action) -> str:
+    def _still(self) -> str:
         image, control = self._newest_image(), self._control
         if image is None:
             return "there is no image"

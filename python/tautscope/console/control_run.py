@@ -12,13 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.console.uncompensated import (
-    MODEL,
-    SECOND_PLANT,
-    ComparedRig,
-    PlayTip,
-    Score,
-)
+from tautscope.console.uncompensated import MODEL, SECOND_PLANT, ComparedRig, PlayTip, Score
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
@@ -67,12 +61,10 @@ class ControlRun(ControlLoop):
         executor: Runs the marker detection.
 
     Attributes:
-        log: Its log.
-        path: The file of the log.
+        log, path: Its log, and the file of this.
         reference: u (n,) [m or rad] of the last tick.
         report: The newest update.
-        ticks: Number of ticks.
-        late: Number of ticks that were late.
+        ticks, late: Number of ticks, and of those that were late.
         unused: Number of images that the loop did not use.
         compensation: Share of the compensation that the operator has chosen.
         times: Computing time of each tick [s].
@@ -155,13 +147,12 @@ class ControlRun(ControlLoop):
         updates: list[tuple[Frame | Measurement, Report, float]] = []
         for source, report in self.updates():
             self.report = report
-            if not isinstance(source, Frame):
-                updates.append((source, report, began))
-                continue
-            if self._last_frame is not None:
-                self.unused += max(source.sequence - self._last_frame - 1, 0)
-            self._last_frame = source.sequence
-            arrived_at = dict(self._arrivals).get(source.sequence, began)
+            arrived_at = began
+            if isinstance(source, Frame):
+                if self._last_frame is not None:
+                    self.unused += max(source.sequence - self._last_frame - 1, 0)
+                self._last_frame = source.sequence
+                arrived_at = dict(self._arrivals).get(source.sequence, began)
             updates.append((source, report, arrived_at))
         self.write_events()
         return updates

@@ -15,7 +15,7 @@ from tautscope.console import messages as msg
 from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
-from tautscope.console.state import ImageState, LogState, blank_state, known, show_truth, values
+from tautscope.console.state import ImageState, LogState, blank_state, known, values
 from tautscope.console.uncompensated import MODEL, PlayTip, Score
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.reader import Log, Request, Tick, Update, read_log
@@ -170,7 +170,7 @@ class LogPlayer:
         state.reference, state.command = values(tick.reference), values(tick.command)
         state.applied = values(tick.sample.applied)
         if self._log.config.dof:
-            show_truth(state, tick.sample.true_state, self._kinematics)
+            state.show_truth(tick.sample.true_state, self._kinematics)
 
     def _add_update(self, index: int, update: Update) -> None:
         row: dict[str, Any] = dict(zip(self._log.update_names, update.row, strict=True))

@@ -57,10 +57,7 @@ class Take(_Message, frozen=True, tag="take"):
 class Command(_Message, frozen=True):
     """What only the holder of the lease may send.
 
-    Attributes:
-        lease: Number of the lease.
-        sequence: Grows from command to command.
-        image: Sequence of the image displayed.
+    `sequence` grows from command to command; `image` is the sequence of the image displayed.
     """
 
     lease: Count
@@ -83,12 +80,7 @@ class Servo(Command, frozen=True, tag="servo"):
 
 
 class Action(Command, frozen=True, tag="action"):
-    """A request without a value, or with a text.
-
-    Attributes:
-        name: What is requested.
-        text: The text of a mark.
-    """
+    """A request without a value, or with the text of a mark."""
 
     name: ActionName
     text: Text = ""
@@ -100,7 +92,6 @@ class Setting(Command, frozen=True, tag="setting"):
     Attributes:
         name: ``compensation``, a share from 0 to 1; ``scale``, of a DOF; ``clutch``, 1 couples
             a DOF to the input device and 0 does not.
-        value: The new value.
         dof: Name of the DOF of ``scale`` and ``clutch``.
     """
 
@@ -128,12 +119,7 @@ class Seek(_Message, frozen=True, tag="seek"):
 
 
 class Drawn(_Message, frozen=True, tag="drawn"):
-    """An image has been drawn.
-
-    Attributes:
-        image: Its sequence.
-        width: Width at which the page shows images [pixels of its screen].
-    """
+    """The image of a sequence has been drawn, `width` pixels of the page's screen wide."""
 
     image: Count
     width: Annotated[int, Meta(ge=0, le=16384)]
@@ -143,7 +129,7 @@ LONGEST_REASON = 500
 """Characters of an error shown at most; escaped, they fit into a record of shared memory."""
 Request: TypeAlias = Action | Setting | SetProfile
 """Commands that are executed once, in their order."""
-ControlMessage: TypeAlias = Stop | Take | Seek | Servo | Action | Setting | SetProfile
+ControlMessage: TypeAlias = Stop | Take | Seek | Servo | Request
 
 decode_hello = msgspec.json.Decoder(Hello).decode
 decode_control = msgspec.json.Decoder(ControlMessage).decode
@@ -156,7 +142,6 @@ class Received(Struct, frozen=True, tag=True):
     Attributes:
         client: Number of the connection; the page cannot choose it.
         at: When it arrived [s, monotonic clock].
-        message: The message.
     """
 
     client: int
@@ -176,8 +161,7 @@ class Reply(Struct, frozen=True):
     Attributes:
         client: Number of the page's connection.
         what: The command.
-        is_accepted: Whether it was executed.
-        reason: Why not, or what a person should know of what was done.
+        reason: Why it was not executed, or what a person should know of what was done.
     """
 
     client: int

@@ -38,8 +38,6 @@ class RigControl:
     Attributes:
         images: When images were published, or without images states.
         kinematics: Of an instrument with [[dof]], if it has positions.
-        lease: Who may command.
-        operator: The source of the reference.
         run: The present run; None while the rig is off.
         fault: Why the rig is off; empty if it is not, or was never on.
         unconfirmed: Why the motors may still move although they were stopped; empty if they do not.

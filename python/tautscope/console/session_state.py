@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from tautscope.console.control_run import ControlRun
 from tautscope.console.messages import LONGEST_REASON
 from tautscope.console.rig_control import RigControl
-from tautscope.console.state import (
-    ImageState,
-    LogState,
-    State,
-    blank_state,
-    known,
-    show_truth,
-    values,
-)
+from tautscope.console.state import ImageState, LogState, State, blank_state, known, values
 from tautscope.loop.safety import advice, by_urgency
 
 _MAY_MOVE = "THE MOTORS MAY STILL MOVE"
@@ -41,9 +35,8 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     if run is not None:
         _add_run(state, run)
         if control.config.dof:
-            show_truth(state, run.sample.true_state, control.kinematics)
-        dropped = run.log.dropped
-        state.log = LogState(log.path, log.size, log.remaining, dropped, run.log.failure)
+            state.show_truth(run.sample.true_state, control.kinematics)
+        state.log = replace(log, dropped=run.log.dropped, failure=run.log.failure)
     state.image.sequence = control.images.newest
     state.motion, message = _motion(control)
     state.message = message[:LONGEST_REASON]
@@ -79,20 +72,17 @@ def _motion(control: RigControl) -> tuple[str, str]:
     if control.is_opening and control.is_interrupted:
         reason = operator.stopped_by or "The page was away"
         unended = "The rig's reset has not ended: use the emergency stop."
-        found = "stopped", f"{reason}. {unended}"
-    elif control.is_opening:
-        found = "opening", "The motors are being enabled and move to the start position."
-    elif control.unconfirmed:
-        found = "unconfirmed", f"{_MAY_MOVE}: {control.unconfirmed}"
-    elif operator.stopped_by:
-        found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
-    elif run is not None:
-        found = _reaction(control, run)
-    elif control.fault:
-        found = "off", f"The motors are off: {control.fault}"
-    else:
-        found = "off", "The motors are off. Enabling moves them to the start position."
-    return found
+        return "stopped", f"{reason}. {unended}"
+    if control.is_opening:
+        return "opening", "The motors are being enabled and move to the start position."
+    if control.unconfirmed:
+        return "unconfirmed", f"{_MAY_MOVE}: {control.unconfirmed}"
+    if operator.stopped_by:
+        return "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
+    if run is not None:
+        return _reaction(control, run)
+    why = f": {control.fault}" if control.fault else ". Enabling moves them to the start position."
+    return "off", f"The motors are off{why}"
 
 
 def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:

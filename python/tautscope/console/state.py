@@ -22,13 +22,7 @@ Known = tuple[float | None, ...]
 
 
 class DofLayout(Struct, frozen=True):
-    """A degree of freedom on the page.
-
-    Attributes:
-        name: Its name.
-        unit: ``mm`` or ``rad``.
-        range: Least and largest command [m or rad]; None where the configuration has none.
-    """
+    """A DOF on the page, with its unit, mm or rad, and its range of commands [m or rad], if any."""
 
     name: str
     unit: str
@@ -86,8 +80,7 @@ class LogState(Struct):
     """The log of the session.
 
     Attributes:
-        path: The file.
-        size: Its size [byte].
+        size: Of its file [byte].
         remaining: Time until the disk is full [s]; None if not known yet.
         dropped: Number of events and images that are not in the log.
         failure: Why recording ended; empty while it works.
@@ -103,11 +96,7 @@ class LogState(Struct):
 class Positions(Struct):
     """Where the tip is, for instruments without an image; each (3,) [m] in the frame of the guide.
 
-    Attributes:
-        reference: Where the reference is.
-        tip: The estimated tip; None if not known.
-        true: The true tip, in simulations.
-        uncompensated: The tip without compensation; None if not known.
+    None where it is not known; ``true`` in simulations.
     """
 
     reference: Values | None
@@ -120,41 +109,28 @@ class State(Struct):
     """All that a page shows beside the image. Every (n,) is [m or rad].
 
     Attributes:
-        mode: What is commanded.
         now: When it was made [s, monotonic clock].
         time: The rig's clock [s].
         motion: ``off``, ``opening``, ``stopped``, ``unconfirmed`` where the drives did not confirm
             that, ``held``, ``moving``, ``ready``, or of a recording ``replay``.
         message: What is in force and why, in one line.
-        reference, command, applied, delta_minus, delta_plus: (n,).
         tip: (n,) estimated; in profile ``paper`` that of the newest image, if this determined it.
         true: (n,) true tip, in simulations without an image of it.
-        uncompensated: (n,) tip without compensation.
-        uncompensated_by: By what that is known.
+        uncompensated, uncompensated_by: (n,) tip without compensation, and by what it is known.
         score: (n,) as `Score.errors`.
         positions: For the side view, where a kinematics has positions.
         width_std: (n,) standard deviations of the slack's width.
-        reaction: The supervisor's reaction in force.
-        flags: The active flags.
+        reaction, flags: The supervisor's reaction in force, and the active flags.
         latched: The flags since the last acknowledgement, the most urgent first; each with its
             meaning and what to do.
-        lead: Share of the compensation that the supervisor allows.
-        compensation: Share that the operator has chosen.
-        profile: The profile of compensation.
-        scale: (n,) of the input device.
-        clutch: (n,) whether it moves each DOF.
-        rested_by: Why the last motion ended, if the operator did not end it.
-        must_release: Whether the operator has to let go of the input device first.
-        is_off_centre: Whether it moves nothing because an axis of it does not rest.
-        lease: Number of the lease.
-        holder: Connection that holds it.
-        program: Motion that runs by itself; empty if none.
-        progress: Its progress, 0 to 1.
+        lead, compensation: Shares of the compensation that the supervisor allows, and that the
+            operator has chosen.
+        scale, clutch: (n,) of the input device, and whether it moves each DOF.
+        rested_by, must_release, is_off_centre, refused: As of `OperatorInput`.
+        lease, holder: As of `Lease`.
+        program, progress: Motion that runs by itself, empty if none, and its share done.
         program_ended: How the last one ended; empty before one has.
         is_recording: Whether a take is being recorded.
-        refused: Reason -> number of refused commands.
-        image: The newest image.
-        log: The log.
         late: Number of control ticks that came late, and all of them.
         stopped_at: When the newest STOP took effect [s, monotonic clock].
         drives: The drives' state, in words.
@@ -203,6 +179,18 @@ class State(Struct):
     drives: str = ""
     replay: tuple[float, float, bool] | None = None
 
+    def show_truth(self, true: ArrayLike | None, kinematics: Kinematics | None) -> None:
+        """Add what an image would show: the true tip (n,), and positions by the kinematics."""
+        self.true = None if true is None else values(true)
+        if kinematics is not None:
+            shown = self.reference, self.tip, self.true, self.uncompensated
+            self.positions = Positions(
+                *(
+                    values(kinematics.tip(np.array(of))[0]) if of and None not in of else None
+                    for of in shown
+                )
+            )
+
 
 def blank_state(mode: Mode, config: Config) -> State:
     """The state of an instrument that is off."""
@@ -215,20 +203,6 @@ def blank_state(mode: Mode, config: Config) -> State:
     state.width_std = state.image.deviation = (None,) * count
     state.scale, state.clutch = (0.4,) * count, (True,) * count
     return state
-
-
-def show_truth(state: State, true: ArrayLike | None, kinematics: Kinematics | None) -> None:
-    """Add what an image would show: the true tip (n,), and positions by the kinematics."""
-
-    def position(of: Known) -> Values | None:
-        assert kinematics is not None
-        return None if None in of else values(kinematics.tip(np.array(of))[0])
-
-    state.true = None if true is None else values(true)
-    if kinematics is not None:
-        truth = None if state.true is None else position(state.true)
-        without = position(state.uncompensated)
-        state.positions = Positions(position(state.reference), position(state.tip), truth, without)
 
 
 def values(of: ArrayLike) -> Values:
