@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-from tautscope.calibration.bands import motion, result
+from tautscope.calibration.bands import labels, motion, result
 from tautscope.calibration.bands.labels import (
     BACKGROUND,
     BAND_A,
@@ -115,8 +115,8 @@ def test_few_random_positions_do_not_follow_three_motors(monkeypatch: pytest.Mon
     phases = 2 * np.pi * times[:, None] / motion.DURATION * [1, 1, 2] + [0, 1, 0]
     regressors = motion._regressors(times, np.sin(phases))
     random, followed = np.random.default_rng(5), 0
-    monkeypatch.setattr(motion, "two_bands", lambda *_: ())
-    monkeypatch.setattr(motion, "_centre", lambda _: random.normal(0, 10, 2))
+    monkeypatch.setattr(labels, "two_bands", lambda *_: ((), ()))
+    monkeypatch.setattr(labels, "centroid", lambda _: random.normal(0, 10, 2))
     for _ in range(200):
         found = motion._evaluate(np.zeros(count), (0, 0, 0), 0, regressors)
         followed += found.following > motion.LEAST_FOLLOWING

@@ -108,18 +108,13 @@ class DelayEstimate:
         turning_points: The second probe, if it has a value.
     """
 
-    delay: float
-    delay_std: float
-    drift: float
-    drift_std: float
+    delay: float = math.nan
+    delay_std: float = math.nan
+    drift: float = math.nan
+    drift_std: float = math.nan
     reason: str = ""
     model: Probe | None = None
     turning_points: Probe | None = None
-
-    @classmethod
-    def unknown(cls, reason: str, *probes: Probe) -> DelayEstimate:
-        """No answer, with the probes that have a value, the model first."""
-        return cls(math.nan, math.nan, math.nan, math.nan, reason, *probes)
 
     @property
     def is_known(self) -> bool:
@@ -170,21 +165,18 @@ def estimate_delay(
         and np.count_nonzero(np.isfinite(tips[:, dof])) >= LEAST_IMAGES
     ]
     if not np.any(np.ptp(motors, axis=0) > 0):
-        return DelayEstimate.unknown("no motor moved")
+        return DelayEstimate(reason="no motor moved")
     if not signals:
         seen = int(np.isfinite(tips).sum(axis=0).max(initial=0))
-        return DelayEstimate.unknown(
-            f"only {seen} images measure a DOF whose motor moved; at least {LEAST_IMAGES} are "
-            "needed"
-        )
+        what = f"only {seen} images measure a DOF whose motor moved"
+        return DelayEstimate(reason=f"{what}; at least {LEAST_IMAGES} are needed")
     search = _Search(signals, stamps, limit)
-    results: list[Probe] = []
-    for name, fit in (("model", fit_model), ("turning points", fit_turning_points)):
-        found = search.run(fit)
-        if isinstance(found, str):
-            return DelayEstimate.unknown(f"{name}: {found}", *results)
-        results.append(found)
-    model, turning_points = results
+    model = search.run(fit_model)
+    if isinstance(model, str):
+        return DelayEstimate(reason=f"model: {model}")
+    turning_points = search.run(fit_turning_points)
+    if isinstance(turning_points, str):
+        return DelayEstimate(reason=f"turning points: {turning_points}", model=model)
     span = float(stamps[-1] - stamps[0])
     return _combined(model, turning_points, span, at_once=_move_at_once(times, motors))
 
@@ -200,32 +192,27 @@ def _move_at_once(times: Floats, motors: Floats) -> bool:
     return bool(np.count_nonzero(count > 1) > AT_ONCE * np.count_nonzero(count))
 
 
-def _combined(model: Probe, turning_points: Probe, span: float, *, at_once: bool) -> DelayEstimate:
-    difference = abs(model.middle - turning_points.middle)
-    apart = difference + span / 2 * max(
-        0.0,
-        abs(model.drift - turning_points.drift)
-        - 3 * math.hypot(model.drift_std, turning_points.drift_std),
-    )
-    joint = math.hypot(model.delay_std, turning_points.delay_std)
+def _combined(model: Probe, found: Probe, span: float, *, at_once: bool) -> DelayEstimate:
+    """The answer of the turning points (`found`), checked by the model."""
+    difference, drift_std = abs(model.middle - found.middle), max(model.drift_std, found.drift_std)
+    joint_drift = math.hypot(model.drift_std, found.drift_std)
+    apart = difference + span / 2 * max(0.0, abs(model.drift - found.drift) - 3 * joint_drift)
+    joint = math.hypot(model.delay_std, found.delay_std)
     if apart > AGREEMENT or (at_once and difference > SIGNIFICANT * joint):
         remedy = "; move one degree of freedom at a time, or use `tautscope calibrate geometry`"
-        return DelayEstimate.unknown(
+        reason = (
             f"the probes disagree by {apart:.2f} s: the model says {model.middle:.3f} s, the "
-            f"turning points {turning_points.middle:.3f} s in the middle of the record"
-            f"{remedy * at_once}",
-            model,
-            turning_points,
+            f"turning points {found.middle:.3f} s in the middle of the record{remedy * at_once}"
         )
-    std = max(turning_points.delay_std, difference / 2)
+        return DelayEstimate(reason=reason, model=model, turning_points=found)
+    std = max(found.delay_std, difference / 2)
     if std > AGREEMENT / 1.5:
-        return DelayEstimate.unknown(f"uncertain by {std:.2f} s", model, turning_points)
-    found = turning_points
-    drift_std = max(model.drift_std, found.drift_std)
+        reason = f"uncertain by {std:.2f} s"
+        return DelayEstimate(reason=reason, model=model, turning_points=found)
     least = min(abs(model.drift), abs(found.drift))
     is_drifting = model.drift * found.drift > 0 and least > 3 * drift_std
     delay, drift = (found.delay, found.drift) if is_drifting else (found.middle, 0.0)
-    return DelayEstimate(delay, std, drift, drift_std, "", model, turning_points)
+    return DelayEstimate(delay, std, drift, drift_std, "", model, found)
 
 
 class _Search:

@@ -36,7 +36,7 @@ class Signal:
     Args:
         times: (n,) of the motor [s], increasing.
         motors: (n, 3) positions of all motors.
-        dof: The DOF.
+        dof: Which of these.
         stamps: (m,) of the images [s].
         tip: (m,) measured tip; NaN where it is unknown.
     """
@@ -115,9 +115,7 @@ class Fit:
     """A fit of the tip at a delay.
 
     Attributes:
-        dof: The DOF.
-        left: Sum of squares of the residual.
-        total: The same of the tip, about the mean of each stretch.
+        left, total: Sums of squares of the residual, and of the tip about the mean of each stretch.
         count: Number of tips.
         gain: Tip travel per motor travel in contact.
         parts: If asked for.
@@ -159,13 +157,11 @@ def fit_model(signal: Signal, shown: Floats, *, by_parts: bool = False) -> Fit |
         slope = _slope(signal.times, signal.table[:, used] @ gains, shown[index])
         slope = _without(_centred(slope, groups), table[:, used])
         stamps = signal.stamps[index]
-        for block in np.split(
-            np.arange(len(tip)), np.flatnonzero(np.diff(stamps // BLOCK) > 0) + 1
-        ):
-            if len(block) >= LEAST_IMAGES:
-                variance = left / len(tip)
-                own_part = stamps[block], residual[block], slope[block], variance
-                parts += _part(signal, *own_part)
+        ends = np.flatnonzero(np.diff(stamps // BLOCK) > 0) + 1
+        columns = (np.split(each, ends) for each in (stamps, residual, slope))
+        for at, rest, change in zip(*columns, strict=True):
+            if len(at) >= LEAST_IMAGES:
+                parts += _part(signal, at, rest, change, left / len(tip))
     return Fit(signal.dof, left, total, len(tip), float(gains.sum()), parts)
 
 

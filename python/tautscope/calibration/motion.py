@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError, MotionHeldError, SignalError
+from tautscope.errors import ConfigError, MotionHeldError, RecordError, SignalError
 from tautscope.loop.actuators import with_actuators
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
@@ -203,20 +203,28 @@ class ImageRecorder(ABC):
         """Note the time of an image, after which the next is due."""
         self._due = captured_at + self.period - 1e-9
 
+    def check_is_complete(self, images: int) -> None:
+        """Check that there are positions, and `images` that were kept.
+
+        Raises:
+            RecordError: There is no motor position or no image.
+        """
+        if not self.ticks or not images:
+            found = f"{len(self.ticks)} motor positions and {images} images"
+            raise RecordError("recording", found, "both, of the same motion")
+
     def move(self, rig: Rig, config: Config, motion: Reference, progress: Progress | None) -> None:
         """Move a rig as `move_rig` does, and collect motors and images."""
         for sample, _ in move_rig(rig, config, motion, progress):
             self.add_tick(sample.time, sample.applied)
-            frame = sample.frame
-            if frame is None or not self.is_due(frame.captured_at):
+            if (frame := sample.frame) is None or not self.is_due(frame.captured_at):
                 continue
+            image = frame.image, frame.captured_at
             if self._executor is None:
-                self.add_image(frame.image, frame.captured_at)
+                self.add_image(*image)
             elif self._running is None or self._running.done():
                 self._wait()
-                self._running = self._executor.submit(
-                    self.add_image, frame.image, frame.captured_at
-                )
+                self._running = self._executor.submit(self.add_image, *image)
         self._wait()
 
     def _wait(self) -> None:

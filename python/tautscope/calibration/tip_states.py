@@ -36,16 +36,10 @@ def tip_states(features: ArrayLike, config: Config) -> Floats:
     for row, measured in zip(states, values, strict=True):
         if not np.isfinite(measured).all():
             continue
-        fits = [
-            fit
-            for start in starts
-            if (fit := model.nearest_state(start, spread, measured, _PIXELS)) is not None
-        ]
-        if not fits:
-            continue
-        state, _ = min(fits, key=lambda fit: fit[1])
-        predicted = model.predict(state)
-        if predicted is None:
+        tried = (model.nearest_state(start, spread, measured, _PIXELS) for start in starts)
+        fits = [fit for fit in tried if fit is not None]
+        state = min(fits, key=lambda fit: fit[1])[0] if fits else None
+        if state is None or (predicted := model.predict(state)) is None:
             continue
         _, jacobian = predicted
         information = jacobian.T @ jacobian + np.diag(spread**-2)

@@ -68,14 +68,11 @@ def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
     """
     labels = np.full(image.shape[:2], BACKGROUND, np.uint8)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RIM + 1,) * 2)
-    every = np.zeros(image.shape[:2], np.uint8)
-    for band in bands:
-        every |= (band > 0).astype(np.uint8)
-    labels[cv2.dilate(every, kernel) > 0] = IGNORED
-    for label, band in zip((BAND_A, BAND_B), bands, strict=False):
-        labels[cv2.erode((band > 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = label
-    blue, green, red = np.moveaxis(image >= SATURATED, 2, 0)
-    labels[blue | green | red] = IGNORED
+    masks = [(band > 0).astype(np.uint8) for band in bands]
+    labels[cv2.dilate(np.maximum.reduce(masks), kernel) > 0] = IGNORED
+    for label, band in zip((BAND_A, BAND_B), masks, strict=False):
+        labels[cv2.erode(band, np.ones((3, 3), np.uint8)) > 0] = label
+    labels[(image >= SATURATED).any(axis=2)] = IGNORED
     return LabelledImage(image, labels)
 
 
@@ -88,8 +85,7 @@ def from_mask(image: Image, mask: Image) -> LabelledImage:
 
 def two_bands(image: Image, weights: Sequence[float], threshold: float) -> tuple[Mask, Mask] | None:
     """The two compact regions of a colour, if it has no others of their size."""
-    kernel = np.array([weights], np.float32)
-    values = cv2.transform(image.astype(np.float32), kernel)
+    values = cv2.transform(image.astype(np.float32), np.array([weights], np.float32))
     values = cv2.GaussianBlur(values, (0, 0), 1.0)
     mask = (values > threshold).astype(np.uint8)
     mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
@@ -104,16 +100,14 @@ def two_bands(image: Image, weights: Sequence[float], threshold: float) -> tuple
     if areas.sum() - larger - smaller > _REMAINDER * (larger + smaller):
         return None
     bands = [(names == name + 1).astype(np.uint8) for name in (first, second)]
-    if any(_touches_border(band) or _solidity(band) < _LEAST_SOLIDITY for band in bands):
+    border = np.concatenate([names[0], names[-1], names[:, 0], names[:, -1]])
+    is_cut = np.isin([first + 1, second + 1], border).any()
+    if is_cut or any(_solidity(band) < _LEAST_SOLIDITY for band in bands):
         return None
     distance = np.linalg.norm(np.subtract(*(centroid(band) for band in bands)))
     if distance < _LEAST_DISTANCE * np.sqrt((larger + smaller) / 2):
         return None
     return bands[0], bands[1]
-
-
-def _touches_border(mask: Mask) -> bool:
-    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
 
 
 def _solidity(mask: Mask) -> float:
@@ -159,23 +153,22 @@ def label_clicks(image: Image, clicks: Sequence[tuple[int, int]]) -> LabelledIma
 
 
 def _grown(image: Image, click: tuple[int, int]) -> Mask:
-    last: Mask | None = None
-    largest = _LARGEST_SHARE * image.shape[0] * image.shape[1]
+    last = np.zeros(image.shape[:2], np.uint8)
     for tolerance in _TOLERANCES:
         mask = np.zeros((image.shape[0] + 2, image.shape[1] + 2), np.uint8)
         flags = 4 | cv2.FLOODFILL_FIXED_RANGE | cv2.FLOODFILL_MASK_ONLY | (1 << 8)
         limits = (tolerance,) * 3
         cv2.floodFill(image.copy(), mask, click, (0, 0, 0), limits, limits, flags)
         region = mask[1:-1, 1:-1]
-        area = int(region.sum())
-        before = 0 if last is None else int(last.sum())
-        if area > largest or (before >= _LEAST_CLICKED and area > _LEAK * before):
+        area, before = int(region.sum()), int(last.sum())
+        has_leaked = before >= _LEAST_CLICKED and area > _LEAK * before
+        if has_leaked or area > _LARGEST_SHARE * last.size:
             break
         last = region
-    if last is None or last.sum() < _LEAST_CLICKED:
+    if last.sum() < _LEAST_CLICKED:
         colour = image[click[1], click[0]].tolist()
         raise CalibrationError(
             f"The colour {colour} at the click {click} cannot be told from its surroundings",
             "Click into the middle of a band, in a sharp image; or use masks",
         )
-    return np.asarray(last, np.uint8)
+    return last

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tautscope.calibration.bands.labels import (
-    LEAST_AREA,
-    LabelledImage,
-    Mask,
-    centroid,
-    labelled,
-    two_bands,
-)
+from tautscope.calibration.bands import labels
+from tautscope.calibration.bands.labels import LEAST_AREA, LabelledImage, Mask
 from tautscope.calibration.colour import fit_discriminant
 from tautscope.calibration.images import Image, to_bgr
 from tautscope.calibration.motion import ImageRecorder, Progress, Sines, article_sines
 from tautscope.config import Config
-from tautscope.errors import CalibrationError, FieldError, RecordError
+from tautscope.errors import CalibrationError, FieldError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
 
@@ -59,9 +55,6 @@ _LAGS = (0.0, 0.5, 1.0)
 class ImageSequence(ImageRecorder):
     """Collects images of a moving instrument, evenly in time and at most `MOST_IMAGES`.
 
-    Args:
-        config: With the camera.
-
     Attributes:
         images: (n) B, G, R.
         times: (n,) capture times [s].
@@ -90,9 +83,7 @@ class ImageSequence(ImageRecorder):
 
     def label(self) -> list[LabelledImage]:
         """The images in which the bands were found, see `find_moving_bands`."""
-        if not self.ticks or not self.images:
-            found = f"{len(self.ticks)} motor positions and {len(self.images)} images"
-            raise RecordError("recording", found, "both, of the same motion")
+        self.check_is_complete(len(self.images))
         return find_moving_bands(self.images, self.times, self.positions)
 
 
@@ -160,12 +151,12 @@ def find_moving_bands(
             raise FieldError(name, array.shape, f"{shape}, one row per image")
     moving, tissue = _split(images)
     regressors = _regressors(stamps, motors)
-    some = slice(None, None, 2)
-    candidates = [
-        _candidate(images[some], own, np.concatenate([tissue, others]), regressors[some])
-        for own, others in _clusters(moving)
-    ]
-    best = max(candidates, key=lambda each: (each.score, each.share))
+    best = _Candidate((0.0, 0.0, 0.0), 0.0, (None,), 0.0)
+    for own, others in _clusters(moving):
+        with suppress(FieldError):  # all pixels of one colour
+            colour = fit_discriminant(own, np.concatenate([tissue, others]))
+            candidate = _evaluate(images[::2], *colour, regressors[::2])
+            best = max(best, candidate, key=lambda each: (each.score, each.share))
     if best.share < LEAST_SHARE:
         raise CalibrationError(
             "No colour of the moving pixels has two bands in most images; the best has them in "
@@ -181,9 +172,7 @@ def find_moving_bands(
         )
     for _ in range(_ITERATIONS):
         found = _labelled(images, best)
-        marker = np.concatenate(
-            [np.concatenate([each.pixels(1), each.pixels(2)]) for each in found]
-        )
+        marker = np.concatenate([each.pixels(label) for each in found for label in (1, 2)])
         background = np.concatenate([each.pixels(0)[::31] for each in found])
         refined = _evaluate(images, *fit_discriminant(marker, background), regressors)
         if refined.score < best.score:
@@ -194,13 +183,15 @@ def find_moving_bands(
 
 def _labelled(images: Sequence[Image], candidate: _Candidate) -> list[LabelledImage]:
     pairs = zip(images, candidate.bands, strict=True)
-    return [labelled(image, bands) for image, bands in pairs if bands is not None]
+    return [labels.labelled(image, bands) for image, bands in pairs if bands is not None]
 
 
 def _split(images: Sequence[Image]) -> tuple[Image, Image]:
     """Pixels (n, 3) of what moved, in colours that what did not move has not; and the latter."""
-    small = np.stack([_halved(image) for image in images])
-    small = np.stack([_matched(image, small[len(small) // 2]) for image in small])
+    height, width = images[0].shape[:2]
+    half = width // 2, height // 2
+    halved = [cv2.resize(each, half, interpolation=cv2.INTER_AREA) for each in images]
+    small = np.stack([_matched(image, halved[len(halved) // 2]) for image in halved])
     median = np.median(small[::2], axis=0).astype(np.int16)
     changed = (np.abs(small.astype(np.int16) - median) > LEAST_CHANGE).any(axis=3)
     ever = cv2.dilate(changed.any(axis=0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
@@ -231,16 +222,10 @@ def _split(images: Sequence[Image]) -> tuple[Image, Image]:
     return own, tissue[:: -(-len(tissue) // (5 * _MOST_PIXELS))]
 
 
-def _matched(image: Image, other: Image) -> Image:
+def _matched(image: NDArray[Any], other: NDArray[Any]) -> Image:
     """The image with the brightness of another: the exposure may be automatic."""
     gain = np.median((other.sum(axis=2) + 10.0) / (image.sum(axis=2) + 10.0))
     return np.asarray(cv2.convertScaleAbs(image, alpha=float(gain)), np.uint8)
-
-
-def _halved(image: Image) -> Image:
-    height, width = image.shape[:2]
-    half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
-    return np.asarray(half, np.uint8)
 
 
 def _clusters(pixels: Image) -> list[tuple[Image, Image]]:
@@ -257,27 +242,19 @@ def _clusters(pixels: Image) -> list[tuple[Image, Image]]:
     return [(pixels[own], pixels[~own]) for own in members if own.sum() > LEAST_AREA]
 
 
-def _candidate(
-    images: Sequence[Image], own: Image, others: Image, regressors: Floats
-) -> _Candidate:
-    try:
-        weights, threshold = fit_discriminant(own, others)
-    except FieldError:  # all pixels of one colour
-        return _Candidate((0.0, 0.0, 0.0), 0.0, (None,) * len(images), 0.0)
-    return _evaluate(images, weights, threshold, regressors)
-
-
 def _evaluate(
     images: Sequence[Image],
     weights: tuple[float, float, float],
     threshold: float,
     regressors: Floats,
 ) -> _Candidate:
-    bands = tuple(two_bands(image, weights, threshold) for image in images)
+    bands = tuple(labels.two_bands(image, weights, threshold) for image in images)
     is_found = np.array([each is not None for each in bands])
     if is_found.mean() < LEAST_SHARE / 2:
         return _Candidate(weights, threshold, bands, 0.0)
-    middle = np.array([_centre(each) for each in bands if each is not None])
+    # The mean of the centroids does not depend on the order of the bands.
+    found = [[labels.centroid(band) for band in pair] for pair in bands if pair is not None]
+    middle = np.mean(found, axis=1)
     rows = regressors[is_found]
     solution, *_ = np.linalg.lstsq(rows, middle, rcond=None)
     variance = middle.var(axis=0).sum()
@@ -286,11 +263,6 @@ def _evaluate(
     left = (middle - rows @ solution).var(axis=0).sum() * (len(rows) - 1) / max(free, 1)
     following = max(1 - left / variance, 0.0) if variance > 1 and free > 0 else 0.0
     return _Candidate(weights, threshold, bands, float(following))
-
-
-def _centre(bands: tuple[Mask, Mask]) -> Floats:
-    """Mean of the centroids of both bands, which does not depend on their order [px]."""
-    return np.asarray(np.mean([centroid(band) for band in bands], axis=0), np.float64)
 
 
 def _regressors(times: Floats, positions: Floats) -> Floats:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, LabelledImage
 from tautscope.calibration.colour import fit_discriminant
@@ -137,7 +136,7 @@ def _figure(fit: ColourFit, images: Sequence[LabelledImage]) -> Figure:
     groups = {"bands": (BAND_A, BAND_B), "everything else": (BACKGROUND,)}
     for (name, labels), colour in zip(groups.items(), (GREEN, GREY), strict=True):
         pixels = np.concatenate([_of(images, label) for label in labels])
-        values: NDArray[np.float64] = pixels @ weights
+        values = pixels @ weights
         share = np.full(len(values), 1 / max(len(values), 1))
         right.hist(values, bins=120, weights=share, label=name, color=colour, alpha=0.7)
     right.axvline(fit.threshold, color=BLACK, linewidth=1, label="threshold")

@@ -67,17 +67,11 @@ class Board:
         if not 0 < self.square < 1:
             raise FieldError("square", self.square, "the side of a square in m, below 1")
 
-    @property
-    def corners(self) -> int:
-        """Number of inner corners."""
-        return (self.columns - 1) * (self.rows - 1)
-
     def texture(self, pixels_per_module: int) -> Image:
         """The board as an image (rows, columns); each square has `MODULES` modules."""
-        size = self.columns * MODULES, self.rows * MODULES
-        modules = self._board.generateImage(size)
-        rows = np.repeat(np.asarray(modules, np.uint8), pixels_per_module, axis=0)
-        return np.repeat(rows, pixels_per_module, axis=1)
+        image = self._board.generateImage((self.columns * MODULES, self.rows * MODULES))
+        modules = np.asarray(image, np.uint8)
+        return modules.repeat(pixels_per_module, axis=0).repeat(pixels_per_module, axis=1)
 
     def write_pdf(self, path: Path) -> None:
         """Write the board in true scale on a page of A4, with a ruler to check the print.
@@ -98,9 +92,8 @@ class Board:
         board = figure.add_axes(area)
         board.imshow(self.texture(_PIXELS_PER_MODULE), cmap="gray", interpolation="none")
         board.set_axis_off()
-        scale = figure.add_axes(
-            (0, 0, 1, 1), facecolor="none", xlim=(0, page[0]), ylim=(0, page[1])
-        )
+        whole = 0, 0, 1, 1
+        scale = figure.add_axes(whole, facecolor="none", xlim=(0, page[0]), ylim=(0, page[1]))
         scale.set_axis_off()
         start, below = page[0] / 2 - 0.025, top - height - 0.012
         for k in range(6):

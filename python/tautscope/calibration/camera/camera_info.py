@@ -30,15 +30,13 @@ def camera_info(camera: Intrinsics) -> str:
         model, coefficients = "plumb_bob", coefficients[:5]
     (fx, fy), (cx, cy) = camera.focal, camera.centre
     width, height = camera.size
-    return "".join(
-        (
-            f"image_width: {width}\nimage_height: {height}\ncamera_name: camera\n",
-            _matrix("camera_matrix", 3, 3, (fx, 0, cx, 0, fy, cy, 0, 0, 1)),
-            f"distortion_model: {model}\n",
-            _matrix("distortion_coefficients", 1, len(coefficients), coefficients),
-            _matrix("rectification_matrix", 3, 3, (1, 0, 0, 0, 1, 0, 0, 0, 1)),
-            _matrix("projection_matrix", 3, 4, (fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0)),
-        )
+    return (
+        f"image_width: {width}\nimage_height: {height}\ncamera_name: camera\n"
+        + _matrix("camera_matrix", 3, 3, (fx, 0, cx, 0, fy, cy, 0, 0, 1))
+        + f"distortion_model: {model}\n"
+        + _matrix("distortion_coefficients", 1, len(coefficients), coefficients)
+        + _matrix("rectification_matrix", 3, 3, (1, 0, 0, 0, 1, 0, 0, 0, 1))
+        + _matrix("projection_matrix", 3, 4, (fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0))
     )
 
 

@@ -13,7 +13,9 @@ from tautscope.calibration.camera.board import LARGEST_SATURATED_SHARE, SATURATE
 from tautscope.calibration.images import Image
 from tautscope.errors import CalibrationError
 
-COLUMNS, ROWS = 4, 3
+_COLUMN_NAMES = ("left", "centre left", "centre right", "right")
+_ROW_NAMES = ("upper", "", "lower")
+COLUMNS, ROWS = len(_COLUMN_NAMES), len(_ROW_NAMES)
 """Cells of the image."""
 LEAST_CORNERS = 6
 """A cell is covered by so many corners of all views."""
@@ -36,11 +38,8 @@ _TILTS = ("left", "right", "upper", "lower")
 class Coverage:
     """Cells of the image in which corners were seen, and tilts of the board.
 
-    Args:
-        size: Width and height of the images [px].
-        board: The board.
-
     Attributes:
+        size: Width and height of the images [px].
         corners: (ROWS, COLUMNS) corners seen per cell.
         tilts: Views per tilt.
         views: Number of views.
@@ -48,17 +47,14 @@ class Coverage:
 
     size: tuple[int, int]
     board: Board
-    corners: NDArray[np.int64] = field(
-        default_factory=lambda: np.zeros((ROWS, COLUMNS), dtype=np.int64)
-    )
+    corners: NDArray[np.int64] = field(default_factory=lambda: np.zeros((ROWS, COLUMNS), np.int64))
     tilts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TILTS, 0))
     views: int = 0
 
     def add(self, view: View) -> None:
         """Count a view."""
-        width, height = self.size
-        columns = np.clip(view.pixels[:, 0] * COLUMNS // width, 0, COLUMNS - 1).astype(int)
-        rows = np.clip(view.pixels[:, 1] * ROWS // height, 0, ROWS - 1).astype(int)
+        cells = np.array([COLUMNS, ROWS])
+        columns, rows = np.clip(view.pixels * cells // self.size, 0, cells - 1).astype(int).T
         np.add.at(self.corners, (rows, columns), 1)
         across, down = _tilt(view, self.board)
         for tilt, value in zip(_TILTS, (across, -across, down, -down), strict=True):
@@ -79,12 +75,9 @@ class Coverage:
         """What to show next, the most useful first; empty if the views suffice."""
         steps = []
         if not self.covered.all():
-            least = np.unravel_index(
-                np.where(self.covered, 10**9, self.corners).argmin(), (ROWS, COLUMNS)
-            )
-            steps.append(
-                f"show the board at the {_place(int(least[0]), int(least[1]))} of the image"
-            )
+            row, column = divmod(int(self.corners.argmin()), COLUMNS)
+            place = f"{_ROW_NAMES[row]} {_COLUMN_NAMES[column]}".strip()
+            steps.append(f"show the board at the {place} of the image")
         lacking = [tilt for tilt in _TILTS if self.tilts[tilt] < LEAST_TILTED]
         if lacking:
             edges = " or ".join(lacking)
@@ -109,8 +102,7 @@ class ViewCollector:
         is_stream: Whether images are consecutive; then only views at rest that differ are used.
 
     Attributes:
-        views: The views used.
-        coverage: How they cover the image.
+        views, coverage: The views used, and how they cover the image.
         rejected: Number of images not used, by reason.
     """
 
@@ -139,8 +131,7 @@ class ViewCollector:
         Raises:
             CalibrationError: They do not; it says why images were not used, and what to show.
         """
-        steps = self.coverage.next_steps()
-        if not steps:
+        if not (steps := self.coverage.next_steps()):
             return
         reasons = [f"{count} images {reason}" for reason, count in self.rejected.most_common()]
         what = "; ".join([f"Too little of the image is covered: {self.coverage.text()}", *reasons])
@@ -178,12 +169,9 @@ class ViewCollector:
 
 def _distance(one: View, other: View) -> float:
     """Mean distance of the corners that both have [px]; infinite without any."""
-    common, mine, others = np.intersect1d(
-        one.ids, other.ids, assume_unique=True, return_indices=True
-    )
-    if not len(common):
-        return float("inf")
-    return float(np.linalg.norm(one.pixels[mine] - other.pixels[others], axis=1).mean())
+    _, mine, others = np.intersect1d(one.ids, other.ids, return_indices=True)
+    distances = np.linalg.norm(one.pixels[mine] - other.pixels[others], axis=1)
+    return float(distances.mean()) if len(distances) else float("inf")
 
 
 def _tilt(view: View, board: Board) -> tuple[float, float]:
@@ -195,9 +183,3 @@ def _tilt(view: View, board: Board) -> tuple[float, float]:
     by_x, by_y, at_origin = homography[2]
     depth = by_x * width / 2 + by_y * height / 2 + at_origin
     return float(by_x * width / depth), float(by_y * height / depth)
-
-
-def _place(row: int, column: int) -> str:
-    vertical = ("upper", "", "lower")[row]
-    horizontal = ("left", "centre left", "centre right", "right")[column]
-    return f"{vertical} {horizontal}".strip()

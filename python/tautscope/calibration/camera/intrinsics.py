@@ -67,8 +67,8 @@ class CameraFit:
 
             with the poses of the views eliminated. Wrong (too small) when the board is not flat,
             its squares differ from the print, or the errors of a view are alike.
-        residual: Root mean square of the distances from measured to projected corners [px].
-        errors: The same of each view.
+        residual, errors: Root mean square of the distances from measured to projected corners
+            [px], of all views and of each.
         views: The views used.
         left_out: Number of views left out because their error is `OUTLIER` times the median.
         residuals: (n, 2) [px] of all corners, measured minus projected.
@@ -128,8 +128,7 @@ def _fit(
         difference = view.pixels - pixels
         residuals.append(difference)
         errors.append(float(np.sqrt((difference**2).sum(axis=1).mean())))
-        by_pose, by_camera = jacobian[:, :6], jacobian[:, 6:]
-        basis, _ = np.linalg.qr(by_pose)
+        by_camera, (basis, _) = jacobian[:, 6:], np.linalg.qr(jacobian[:, :6])
         free = by_camera - basis @ (basis.T @ by_camera)
         information += free.T @ free
     every = np.concatenate(residuals)

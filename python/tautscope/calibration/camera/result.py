@@ -95,8 +95,8 @@ def to_loop_model(camera: Intrinsics) -> tuple[Intrinsics, float]:
             "the fitted fisheye lens folds back within the image",
             "Show the board close to the corners of the image",
         )
-    k1, k2, k3, k4, k5, k6 = _fit_gain(radii, bent / radii)
-    distortion = tuple(map(float, (k1, k2, 0, 0, k3, k4, k5, k6)))
+    gain = _fit_gain(radii, bent / radii).tolist()
+    distortion = (*gain[:2], 0.0, 0.0, *gain[2:])
     converted = Intrinsics(camera.size, "pinhole", camera.focal, camera.centre, distortion)
     x = np.column_stack([radii, np.zeros_like(radii), np.ones_like(radii)])
     rays = np.vstack([x, x[:, [1, 0, 2]]])
@@ -112,10 +112,8 @@ def _bent_angle(camera: Intrinsics, angles: Floats) -> Floats:
 
 def widest_angle(camera: Intrinsics) -> float:
     """Largest angle from the optical axis in the image, at most `WIDEST`."""
-    width, height = camera.size
-    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64)
-    (fx, fy), (cx, cy) = camera.focal, camera.centre
-    radius = np.hypot((corners[:, 0] - cx) / fx, (corners[:, 1] - cy) / fy).max()
+    corners = np.array([(0, 0), camera.size])  # the farthest has the farther u and v of them
+    radius = np.hypot(*np.abs((corners - camera.centre) / camera.focal).max(axis=0))
     angles = np.linspace(0, WIDEST, 2000)
     reached = _bent_angle(camera, angles) >= radius
     return float(angles[reached.argmax()]) if reached.any() else float(WIDEST)
@@ -125,7 +123,7 @@ def _fit_gain(radii: Floats, gain: Floats) -> Floats:
     """Numerator and denominator of the rational gain, by iterated linear least squares."""
     scale = float(radii.max())
     square = (radii / scale) ** 2
-    powers = np.column_stack([square, square**2, square**3])
+    powers = square[:, None] ** [1, 2, 3]
     rows = np.hstack([powers, -gain[:, None] * powers])
     below = np.ones_like(gain)
     solution: Floats = np.zeros(6)
@@ -136,8 +134,7 @@ def _fit_gain(radii: Floats, gain: Floats) -> Floats:
         below = 1 + powers @ solution[3:]
         if (below <= 0).any():
             break
-    units: Floats = scale ** -np.array([2.0, 4.0, 6.0, 2.0, 4.0, 6.0])
-    return solution * units
+    return solution / scale ** np.array([2.0, 4.0, 6.0, 2.0, 4.0, 6.0])
 
 
 def _figure(fit: CameraFit, coverage: Coverage) -> Figure:
@@ -147,12 +144,10 @@ def _figure(fit: CameraFit, coverage: Coverage) -> Figure:
     image, scatter = figure.subplots(1, 2, width_ratios=(width / height, 1))
     corners = np.concatenate([view.pixels for view in fit.views])
     image.scatter(*corners.T, s=3, linewidths=0, color=BLUE)
-    for row in range(ROWS):
-        for column in range(COLUMNS):
-            place = (column + 0.5) * width / COLUMNS, (row + 0.5) * height / ROWS
-            count = int(coverage.corners[row, column])
-            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
-            image.text(*place, str(count), ha="center", va="center", fontsize=8, bbox=box)
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+    for (row, column), count in np.ndenumerate(coverage.corners):
+        place = (column + 0.5) * width / COLUMNS, (row + 0.5) * height / ROWS
+        image.text(*place, str(count), ha="center", va="center", fontsize=8, bbox=box)
     for k in range(1, COLUMNS):
         image.axvline(k * width / COLUMNS, color="0.7", linewidth=0.6)
     for k in range(1, ROWS):

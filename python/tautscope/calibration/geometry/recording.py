@@ -14,7 +14,7 @@ from tautscope.calibration.bands.labels import centroid, two_bands
 from tautscope.calibration.images import Image, to_bgr
 from tautscope.calibration.motion import DURATION, ImageRecorder, Progress, sweep_motion
 from tautscope.config import CameraConfig, Config
-from tautscope.errors import RecordError, SignalError
+from tautscope.errors import SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.kinematics import Floats
@@ -35,8 +35,7 @@ class Patch:
     """The part of an image in which the bands are.
 
     Attributes:
-        left: Column of its first pixel in the image [px].
-        top: Row of its first pixel.
+        left, top: Column and row of its first pixel in the image [px].
         pixels: The pixels; the whole image in a format without one element per pixel.
     """
 
@@ -131,8 +130,7 @@ class Recorder(ImageRecorder):
 
     def __init__(self, config: Config, executor: Executor | None = None) -> None:
         super().__init__(IMAGE_PERIOD, executor)
-        self._camera = config.camera
-        self._vision = config.vision
+        self._camera, self._vision = config.camera, config.vision
         self._detector = MarkerDetector(config)
         self._model = build_feature_model(config)
         self._images: list[tuple[float, Floats, Floats, Patch, float]] = []
@@ -153,37 +151,25 @@ class Recorder(ImageRecorder):
         pixels = patch.pixels
         if pixels.ndim == 2:  # planes: brightness, and below it colour
             pixels = pixels[: self._camera.height, :, None]
-        is_saturated = pixels.max(axis=-1) == 255 if pixels.size else np.zeros(1)
-        saturated = float(np.mean(is_saturated))
-        by_regions = self._by_regions(image)
-        self._images.append((captured_at, features, by_regions, patch, saturated))
+        saturated = float(np.mean(pixels.max(axis=-1) == 255)) if pixels.size else 0.0
+        self._images.append((captured_at, features, self._by_regions(image), patch, saturated))
         return detection
 
     def _by_regions(self, image: Image) -> Floats:
         """The centroids of two regions of the bands' colour, ordered as the motors let expect."""
-        unknown = np.full(4, np.nan)
         predicted = self._model.predict(self.ticks[-1][1]) if self.ticks else None
-        if predicted is None:
-            return unknown
-        vision = self._vision
         pixels = to_bgr(image, self._camera.pixel_format)
-        bands = two_bands(pixels, vision.weights, vision.threshold)
-        if bands is None:
-            return unknown
+        bands = two_bands(pixels, self._vision.weights, self._vision.threshold)
+        if predicted is None or bands is None:
+            return np.full(4, np.nan)
         first, second = (centroid(band) for band in bands)
         features = predicted[0]
         is_ordered = (second - first) @ (features[2:] - features[:2]) > 0
         return np.concatenate([first, second] if is_ordered else [second, first])
 
     def recording(self) -> Recording:
-        """What was collected, in the order of capture.
-
-        Raises:
-            RecordError: There is no motor position or no image.
-        """
-        if not self.ticks or not self._images:
-            found = f"{len(self.ticks)} motor positions and {len(self._images)} images"
-            raise RecordError("recording", found, "both, of the same motion")
+        """What was collected, in the order of capture; errors as `check_is_complete`."""
+        self.check_is_complete(len(self._images))
         times, motors = zip(*self.ticks, strict=True)
         images = sorted(self._images, key=lambda each: each[0])
         captured_at, features, by_regions, patches, saturated = zip(*images, strict=True)
