@@ -6,6 +6,7 @@ Its limits of time are longer than in use, because the computer may be busy.
 
 from __future__ import annotations
 
+import multiprocessing
 import threading
 import time
 from collections.abc import Iterator
@@ -22,9 +23,13 @@ from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
 from tautscope.console.live_twin import LiveTwin
+from tautscope.console.log_player import LogPlayer
+from tautscope.console.messages import decode_state
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
+from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.start import web_server
+from tautscope.log.reader import Log
 from tautscope.loop.measurement import Tip
 from tautscope.loop.rig import Frame, Rig, Sample
 
@@ -133,6 +138,30 @@ def running_console(
         finally:
             ending.set()
             thread.join()
+
+
+@contextmanager
+def player_of(log: Log) -> Iterator[tuple[LogPlayer, Channels]]:
+    """A player of a log, and the channels of the page that it is shown on."""
+    memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
+    player = LogPlayer(log, Channels(memory))
+    try:
+        yield player, Channels(memory)
+    finally:
+        player.close()
+
+
+def play_all(player: LogPlayer, shown: Channels) -> list[dict[str, Any]]:
+    """Play to the end; the states that were shown."""
+    states = []
+
+    def look() -> bool:
+        if (found := shown.state.newest()) is not None:
+            states.append(decode_state(found[1]))
+        return True
+
+    player.run(look)
+    return states
 
 
 def rests(console: RunningConsole, duration: float = 0.3) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,9 @@ import numpy as np
 import tautscope
 from drawn import short_experiment
 from recorded import record
-from running import Arm
+from running import Arm, play_all, player_of
 from tautscope.console import messages as msg
-from tautscope.console.log_player import LogPlayer
 from tautscope.console.rig_control import RigControl
-from tautscope.console.shared import Channels, SharedMemory
 from tautscope.log.reader import Tick, read_log
 from tautscope.log.writer import LogWriter
 from tautscope.loop.rig import Sample
@@ -26,21 +23,10 @@ def test_the_player_shows_the_recorded_states_and_images(tmp_path: Path, monkeyp
     path = tmp_path / "run.mcap"
     record(path, config, 0.6)
     log = read_log(path)
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    shown, seen = Channels(memory), []
-    player = LogPlayer(log, Channels(memory))
     monkeypatch.setattr("tautscope.console.log_player.STATE_PERIOD", 0.0)
-    shown.inbound.write(msg.encode(msg.Received(5, 0.0, msg.Take())))
-
-    def look() -> bool:
-        if (found := shown.state.newest()) is not None:
-            seen.append(msg.decode_state(found[1]))
-        return True
-
-    try:
-        player.run(look)
-    finally:
-        player.close()
+    with player_of(log) as (player, shown):
+        shown.inbound.write(msg.encode(msg.Received(5, 0.0, msg.Take())))
+        seen = play_all(player, shown)
     ticks = [event for event in log.events.values() if isinstance(event, Tick)]
     by_time = {tick.sample.time: tick for tick in ticks}
     assert len(seen) > 50
@@ -63,8 +49,6 @@ def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     record(path, config, 0.6)
     log = read_log(path)
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    shown, player = Channels(memory), LogPlayer(log, Channels(memory))
     ticks = [event for event in log.events.values() if isinstance(event, Tick)]
 
     def seek(time: float | None, is_playing: bool) -> dict[str, Any]:
@@ -76,7 +60,7 @@ def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
         assert found is not None
         return msg.decode_state(found[1])
 
-    try:
+    with player_of(log) as (player, shown):
         for time in (0.4, 0.1, 1e9):
             state = seek(time, is_playing=False)
             shows = min(ticks[0].sample.time + time, ticks[-1].sample.time)
@@ -89,8 +73,6 @@ def test_a_timeline_seeks_and_pauses(tmp_path: Path) -> None:
         seek(0.5, is_playing=True)
         player.run(lambda: True)
         assert seek(None, is_playing=False)["time"] == ticks[-1].sample.time
-    finally:
-        player.close()
 
 
 def test_the_page_is_answered_while_the_recording_has_a_gap(tmp_path: Path) -> None:
@@ -99,8 +81,6 @@ def test_the_page_is_answered_while_the_recording_has_a_gap(tmp_path: Path) -> N
     with LogWriter(path, config) as writer:
         for time in (0.0, 0.005, 1e6):  # the disk was too slow for those in between
             writer.tick(Sample(time, np.zeros(2)), np.zeros(2), np.zeros(2))
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    shown, player = Channels(memory), LogPlayer(read_log(path), Channels(memory))
     states = []
 
     def look() -> bool:
@@ -110,8 +90,8 @@ def test_the_page_is_answered_while_the_recording_has_a_gap(tmp_path: Path) -> N
             shown.inbound.write(msg.encode(pause))
         return len(states) < 5
 
-    player.run(look)
-    player.close()
+    with player_of(read_log(path)) as (player, shown):
+        player.run(look)
     assert states
     assert not player._is_playing
 
@@ -128,11 +108,9 @@ def test_a_time_before_a_change_shows_the_compensation_then(tmp_path: Path) -> N
             control.run.tick()
             control.run.step()
         control.shut_down()
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
-    player = LogPlayer(read_log(tmp_path / "console-1.mcap"), Channels(memory))
     found = []
-    for time in (0.0, 0.9, 0.1):
-        player._seek(time)
-        found.append(player._state.compensation)
-    player.close()
+    with player_of(read_log(tmp_path / "console-1.mcap")) as (player, _):
+        for time in (0.0, 0.9, 0.1):
+            player._seek(time)
+            found.append(player._state.compensation)
     assert found == [1.0, 0.0, 1.0]

@@ -16,7 +16,7 @@ import own_catheter
 import pytest
 import tautscope
 from numpy.typing import ArrayLike
-from running import Arm, Page, RunningConsole, rests, running_console
+from running import Arm, Page, RunningConsole, play_all, player_of, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
 from tautscope.console.actions import Actions
@@ -27,7 +27,6 @@ from tautscope.console.messages import (
     Reply,
     Servo,
     SetProfile,
-    decode_state,
 )
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
@@ -127,19 +126,8 @@ def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log_player, "STATE_PERIOD", 0.0)
     monkeypatch.setattr(log_player, "_IDLE_PERIOD", 1e9)
     monkeypatch.setattr(time, "sleep", lambda pause: None)  # at once
-    memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
-    shown, states = Channels(memory), []
-    player = log_player.LogPlayer(log, Channels(memory))
-
-    def look() -> bool:
-        if (found := shown.state.newest()) is not None:
-            states.append(decode_state(found[1]))
-        return True
-
-    try:
-        player.run(look)
-    finally:
-        player.close()
+    with player_of(log) as (player, shown):
+        states = play_all(player, shown)
     ticks = [event for event in log.events.values() if isinstance(event, Tick)]
     by_time = {tick.sample.time: tick for tick in ticks}
     compared = [state for state in states if state["time"] in by_time]

@@ -12,6 +12,8 @@ from tautscope.config import PixelFormat
 from tautscope.errors import FieldError, MissingPathError
 
 Image = NDArray[np.uint8]
+SATURATED = 250
+"""Level of grey, or of a channel, from which a pixel is overexposed."""
 
 _TO_BGR = {
     "rgb": cv2.COLOR_RGB2BGR,

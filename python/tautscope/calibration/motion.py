@@ -23,7 +23,6 @@ from tautscope.loop.references import Reference, Segment
 from tautscope.loop.rig import Rig, Sample, check_sample
 from tautscope.loop.safety import Reaction
 
-Image = NDArray[np.uint8]
 Progress = Callable[[float], None]
 """Called with the share of the motion done, 0 to 1, once per second."""
 DURATION = 60.0
@@ -188,7 +187,7 @@ class ImageRecorder(ABC):
         self._running: Future[object] | None = None
 
     @abstractmethod
-    def add_image(self, image: Image, captured_at: float) -> object:
+    def add_image(self, image: NDArray[np.uint8], captured_at: float) -> object:
         """Use an image that is due, and call `used`."""
 
     def add_tick(self, time: float, motors: Floats) -> None:

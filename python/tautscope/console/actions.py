@@ -21,18 +21,12 @@ from tautscope.loop.safety import Reaction
 
 
 class Actions:
-    """Executes requests; each is refused or executed completely, and noted in the log.
-
-    Args:
-        control: Rig and loop.
-        newest_image: Returns the newest image, if there is one.
-    """
+    """Executes requests; each is refused or executed completely, and noted in the log."""
 
     def __init__(
         self, control: RigControl, newest_image: Callable[[], NDArray[np.uint8] | None]
     ) -> None:
-        self._control = control
-        self._newest_image = newest_image
+        self._control, self._newest_image = control, newest_image
         self._takes = self._stills = 0
         self._text, self._take_began = "", 0.0
 

@@ -53,10 +53,8 @@ class ControlRun(ControlLoop):
     """Ticks of the control loop with the operator's reference, all of them in a log.
 
     Args:
-        config: Settings of the loop.
         rig: A rig after its `reset`, whose `step` waits for the end of the control period.
         sample: Its newest sample.
-        operator: The source of the reference.
         path: New file of the log.
         executor: Runs the marker detection.
 

@@ -34,7 +34,6 @@ class StateFeed:
     """The state of the control process, and its replies to each page.
 
     Args:
-        channels: Views of the shared memory.
         layout: Sent to each page once.
         latency: Returns median and 95th percentile of the time from an image's arrival until it
             was drawn [s], if they are known.
@@ -44,14 +43,9 @@ class StateFeed:
     """
 
     def __init__(
-        self,
-        channels: Channels,
-        layout: Layout,
-        latency: Callable[[], tuple[float, float] | None],
+        self, channels: Channels, layout: Layout, latency: Callable[[], tuple[float, float] | None]
     ) -> None:
-        self._layout = layout
-        self._channels = channels
-        self._latency = latency
+        self._channels, self._layout, self._latency = channels, layout, latency
         self._newest = b""
         self._number = 0
         self.holder: int | None = None
@@ -72,8 +66,7 @@ class StateFeed:
                 self._number, self._newest = found
                 self.holder = msg.decode_state(self._newest)["holder"]
             for data in replies:
-                queue = self._replies.get(msg.decode_reply(data).client)
-                if queue is not None:
+                if (queue := self._replies.get(msg.decode_reply(data).client)) is not None:
                     queue.append(data)
             async with self._has_news:
                 self._has_news.notify_all()
@@ -126,18 +119,13 @@ class ImageFeed:
     A message is the length of the overlay in 4 bytes, little-endian, the overlay in JSON, and the
     JPEG, which is smaller than the camera's image if no page shows it in full size.
 
-    Args:
-        channel: The images in the shared memory.
-        pixel_format: Their pixel format.
-
     Attributes:
         latencies: Times from the arrival of an image in the control process until a page reported
             that it was drawn [s], the newest 250 of all pages.
     """
 
     def __init__(self, channel: ImageChannel, pixel_format: PixelFormat) -> None:
-        self._channel = channel
-        self._pixel_format = pixel_format
+        self._channel, self._pixel_format = channel, pixel_format
         self._viewers: dict[ServerConnection, _Viewer] = {}
         self._newest = b""
         self._sequence = 0
@@ -148,10 +136,7 @@ class ImageFeed:
         """Poll the shared memory; encode an image if somebody sees it."""
         while True:
             await asyncio.sleep(POLL_PERIOD)
-            if not self._viewers:
-                continue
-            found = self._channel.newest()
-            if found is None:
+            if not self._viewers or (found := self._channel.newest()) is None:
                 continue
             image, overlay = found
             width = max(viewer.width for viewer in self._viewers.values())
@@ -186,12 +171,10 @@ class ImageFeed:
 
     def acknowledge(self, connection: ServerConnection, sequence: int, width: int) -> None:
         """A page has drawn an image, and with it those sent before, `width` pixels wide."""
-        viewer = self._viewers.get(connection)
-        if viewer is None:
+        if (viewer := self._viewers.get(connection)) is None:
             return
         viewer.width = width or math.inf
-        arrived_at = viewer.sent.get(sequence)
-        if arrived_at is not None:
+        if (arrived_at := viewer.sent.get(sequence)) is not None:
             self.latencies.append(time.monotonic() - arrived_at)
         viewer.sent = {each: at for each, at in viewer.sent.items() if each > sequence}
         viewer.may_send.set()

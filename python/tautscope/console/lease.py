@@ -40,9 +40,6 @@ class ImageTimes:
 class Lease:
     """The lease of the operator; at most one connection holds it.
 
-    Args:
-        images: When images were published.
-
     Attributes:
         number: Number of the lease; every change of the holder makes a new one.
         holder: The connection that holds it; None if nobody does.
@@ -81,18 +78,13 @@ class Lease:
         is_servo = isinstance(command, Servo)
         if command.sequence <= self._sequences[is_servo]:
             return "repeated or out of order"
-        age = self._images.age if needs_image else self._images.outdated
-        reason = self._lateness(command.image, age(command.image, now))
-        if not reason:
-            self._sequences[is_servo] = command.sequence
-        return reason
-
-    def _lateness(self, image: int, age: float) -> str:
-        if age <= COMMAND_AGE:
-            return ""
+        age_of = self._images.age if needs_image else self._images.outdated
+        age = age_of(command.image, now)
         if age == float("inf"):
             return "the page shows no recent image"
-        is_newest = image == self._images.newest
-        late = "the page shows an old image, or its commands are late"
-        what = "no new image came" if is_newest else late
-        return f"{what}: for {age:.2f} s, at most {COMMAND_AGE:g} s"
+        if age > COMMAND_AGE:
+            late = "the page shows an old image, or its commands are late"
+            what = "no new image came" if command.image == self._images.newest else late
+            return f"{what}: for {age:.2f} s, at most {COMMAND_AGE:g} s"
+        self._sequences[is_servo] = command.sequence
+        return ""

@@ -22,9 +22,6 @@ class LiveTwin(Twin):
 
     A tick that wakes late does not catch up: the rig's clock stands meanwhile. An image that is due
     while another is rendered is dropped.
-
-    Args:
-        config: The rig's geometry and `config.twin`.
     """
 
     def __init__(self, config: Config) -> None:

@@ -15,16 +15,14 @@ from tautscope.console import messages as msg
 from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
-from tautscope.console.state import ImageState, LogState, blank_state, known, values
+from tautscope.console.state import STATE_PERIOD, ImageState, LogState, blank_state, known, values
 from tautscope.console.uncompensated import MODEL, PlayTip, Score
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.reader import Log, Request, Tick, Update, read_log
 from tautscope.loop.kinematics import build_kinematics
 
-STATE_PERIOD = 0.02
-"""Time between two states for the page [s]."""
 _IDLE_PERIOD = 0.1
-"""The same while the log does not play [s]."""
+"""Time between two states while the log does not play [s]."""
 _LEAD_IN = 0.5
 """Time of the log that is read, and not shown, before the one that was chosen [s]."""
 
@@ -54,23 +52,17 @@ def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) 
 
 
 class LogPlayer:
-    """Publishes the events of a log as the control process would.
-
-    Args:
-        log: The log.
-        channels: This process's views of the shared memory.
-    """
+    """Publishes the events of a log as the control process would."""
 
     def __init__(self, log: Log, channels: Channels) -> None:
         self._log, self._channels = log, channels
         self._publisher = Publisher(log.config, channels.images)
         config = log.config
-        message = f"Recording {log.path.name}. Nothing is steered."
         self._kinematics = build_kinematics(config) if config.dof else None
         self._state = blank_state("replay", config)
-        self._state.motion, self._state.message = "replay", message
+        self._state.motion, self._state.drives = "replay", "recorded"
+        self._state.message = f"Recording {log.path.name}. Nothing is steered."
         self._state.must_release = False
-        self._state.drives = "recorded"
         self._state.log = LogState(str(log.path), log.path.stat().st_size)
         self._state.uncompensated_by = MODEL
         self._published_at = 0.0
@@ -152,7 +144,11 @@ class LogPlayer:
         elif isinstance(event, Update):
             self._add_update(index, event)
         else:
-            self._add_request(event)
+            name, _, value = event.text.partition(" ")
+            if name == "set_compensation":
+                self._state.compensation = float(value)
+            if name == "note":
+                self._state.message = f"Recording {self._log.path.name}: {value}"
 
     def _add_tick(self, tick: Tick) -> None:
         state = self._state
@@ -194,10 +190,3 @@ class LogPlayer:
             bands = Bands(estimate, predicted, reference, without, (a, b))
             image = self._log.image(index)
             self._publisher.submit(self._images, image, time.monotonic(), bands)
-
-    def _add_request(self, request: Request) -> None:
-        name, _, value = request.text.partition(" ")
-        if name == "set_compensation":
-            self._state.compensation = float(value)
-        if name == "note":
-            self._state.message = f"Recording {self._log.path.name}: {value}"

@@ -46,10 +46,6 @@ class OperatorInput:
     It is let go when nothing is held and every axis is within `DEAD_BAND`: one that never rests, as
     a trigger in place of a stick, moves nothing.
 
-    Args:
-        config: Limits of speed and travel.
-        lease: The lease.
-
     Attributes:
         reference: u (n,) [m or rad].
         scale: (n,) share of the largest speed at full deflection.
@@ -110,8 +106,7 @@ class OperatorInput:
         # While a rig opens there are no images yet; then only the page's presence counts.
         moves = servo.is_holding or self.program is not None
         reason = self._fault(servo)
-        reason = reason or self._lease.refusal(received.client, servo, now, needs_image=moves)
-        if reason:
+        if reason := reason or self._lease.refusal(received.client, servo, now, needs_image=moves):
             self.count_refusal(reason)
             return
         # Its age counts from the arrival, also if the control loop reads it late.

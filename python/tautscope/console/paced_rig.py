@@ -16,11 +16,7 @@ T = TypeVar("T")
 
 
 class Pace:
-    """Waits for the ends of control periods; who comes late does not catch up.
-
-    Args:
-        period: The control period [s].
-    """
+    """Waits for the ends of control periods [s]; who comes late does not catch up."""
 
     def __init__(self, period: float) -> None:
         self._period = period

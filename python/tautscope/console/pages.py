@@ -13,27 +13,22 @@ _TYPES = {
     "js": "text/javascript; charset=utf-8",
     "svg": "image/svg+xml",
 }
-_START = "index.html"
 
 
 class Pages:
     """All files of the page in memory; nothing else can be requested.
-
-    Args:
-        hosts: The server's names with port, to which the page may connect.
 
     Attributes:
         files: Path -> content type and content.
     """
 
     def __init__(self, hosts: list[str]) -> None:
-        folder = files("tautscope.console") / "page"
         self.files = {
-            f"/{file.name}": (_TYPES[file.name.rpartition(".")[2]], file.read_bytes())
-            for file in folder.iterdir()
-            if file.name.rpartition(".")[2] in _TYPES
+            f"/{file.name}": (_TYPES[kind], file.read_bytes())
+            for file in (files("tautscope.console") / "page").iterdir()
+            if (kind := file.name.rpartition(".")[2]) in _TYPES
         }
-        self.files["/"] = self.files[f"/{_START}"]
+        self.files["/"] = self.files["/index.html"]
         sockets = " ".join(f"ws://{host}" for host in hosts)
         self._policy = (
             f"default-src 'none'; script-src 'self'; style-src 'self'; connect-src {sockets}; "

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tautscope.calibration.images import Image
 from tautscope.config import Config
-from tautscope.console.shared import Image, ImageChannel, Overlay
+from tautscope.console.shared import ImageChannel, Overlay
 from tautscope.console.state import LogState
 from tautscope.hardware.realtime import OTHERS, set_realtime_priority
 from tautscope.loop.construction import build_feature_model
@@ -27,12 +28,7 @@ _LOG_PERIOD = 1.0
 class Bands:
     """States of an image of the bands, each (3,) [m, rad, rad].
 
-    Attributes:
-        estimate: State estimate.
-        predicted: Predicted state.
-        reference: Reference.
-        uncompensated: The tip without compensation.
-        found: Which bands were found.
+    ``uncompensated`` is the tip without compensation; ``found`` says which bands were found.
     """
 
     estimate: Floats
@@ -44,10 +40,6 @@ class Bands:
 
 class Publisher:
     """Copies images into shared memory in a thread of its own; only the newest is kept.
-
-    Args:
-        config: Camera and instrument, for the outlines.
-        channel: Where images are written to.
 
     Attributes:
         log: Size of the log and remaining time, renewed each second.
@@ -141,8 +133,7 @@ class Publisher:
         return round(u, 1), round(v, 1)
 
     def _check_log(self, now: float) -> None:
-        path = self.log_path
-        if path is None:
+        if (path := self.log_path) is None:
             return
         try:
             size, free = path.stat().st_size, shutil.disk_usage(path).free

@@ -30,7 +30,6 @@ class RigControl:
     """Starts and ends runs of the control loop.
 
     Args:
-        config: Settings of the loop.
         rig: In real time: a `LiveTwin`, `HardwareRig`, or a rig of the user's as a `PacedRig`.
         folder: For logs and stills.
         executor: Runs the marker detection.

@@ -63,18 +63,10 @@ def run_server(memory: SharedMemory, token: str, sockets: list[Any]) -> None:
 
 
 class Server:
-    """Serves the page on one port.
-
-    Args:
-        channels: This process's views of the shared memory.
-        memory: What the processes share, with the layout of the page.
-        token: What a page has to know.
-        port: The port.
-    """
+    """Serves the page on one port, to those who know the token."""
 
     def __init__(self, channels: Channels, memory: SharedMemory, token: str, port: int) -> None:
-        self._channels = channels
-        self._token = token.encode()
+        self._channels, self._token = channels, token.encode()
         self._hosts = [f"{name}:{port}" for name in (ADDRESS, "localhost")]
         self._origins = [f"http://{host}" for host in self._hosts]
         self._pages = Pages(self._hosts)

@@ -16,6 +16,7 @@ from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels
+from tautscope.console.state import STATE_PERIOD
 from tautscope.errors import TautscopeError, described
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.measurement import Measurement
@@ -24,30 +25,17 @@ from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
 
 _LOG = logging.getLogger(__name__)
-STATE_PERIOD = 0.02
-"""Time between two states for the page [s]."""
 _IDLE_PERIOD = 0.005
 """Time between two looks at the commands while the rig is off [s]."""
 
 
 class Session:
-    """Runs the control loop for the operator's console.
-
-    Args:
-        control: Rig and loop.
-        channels: This process's views of the shared memory.
-        must_end: Whether the session has to end, e.g. because the web server did.
-    """
+    """Runs the control loop for the operator's console, until `must_end`."""
 
     def __init__(
-        self,
-        control: RigControl,
-        channels: Channels,
-        must_end: Callable[[], bool] = lambda: False,
+        self, control: RigControl, channels: Channels, must_end: Callable[[], bool] = lambda: False
     ) -> None:
-        self._control = control
-        self._channels = channels
-        self._must_end = must_end
+        self._control, self._channels, self._must_end = control, channels, must_end
         self._publisher = Publisher(control.config, channels.images)
         self._actions = Actions(control, lambda: self._publisher.image)
         self._layout = FrameLayout(control.config.camera)

@@ -15,14 +15,13 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from tautscope.calibration.images import Image
 from tautscope.config import Config
 from tautscope.console.messages import LARGEST_MESSAGE
 from tautscope.console.state import layout_of
 from tautscope.loop.frame_layout import FrameLayout
 
-Image = NDArray[np.uint8]
 _HEADER = struct.Struct("<QII")
 """Number of the record from 1 on, length and checksum of its data."""
 _NUMBER = struct.Struct("<Q")
@@ -85,10 +84,7 @@ class Slots:
         number = max(
             _NUMBER.unpack_from(self._memory, slot * self._stride)[0] for slot in range(self._count)
         )
-        if number <= self._read:
-            return None
-        data = self._record(number)
-        if data is None:
+        if number <= self._read or (data := self._record(number)) is None:
             return None
         self._read = number
         return number, data
@@ -119,14 +115,11 @@ class Overlay(msgspec.Struct):
     Attributes:
         sequence: Of the image, as in `ImageTimes`.
         published_at: [s, monotonic clock].
-        width: Of the image [px].
-        height: Of the image [px].
-        measured: Outlines of the bands found, each (n, 2).
-        predicted: Outlines of the bands that the model predicted.
-        tip: Centre of the distal band where the tip is estimated; None if not known.
-        target: The same where the reference is.
-        uncompensated: Outlines of the bands where they would be without compensation.
-        uncompensated_tip: The centre of the distal one.
+        width, height: Of the image [px].
+        measured, predicted, uncompensated: Outlines of the bands, each (n, 2): those found, as the
+            model predicts them, and where they would be without compensation.
+        tip, target, uncompensated_tip: Centre of the distal band where the tip is estimated, where
+            the reference is, and without compensation; None if not known.
     """
 
     sequence: int
@@ -189,8 +182,7 @@ class ImageChannel:
 
         An image that is overwritten meanwhile shows parts of both, which harms only the view.
         """
-        found = self._info.newest()
-        if found is None:
+        if (found := self._info.newest()) is None:
             return None
         number, data = found
         return self._pixels[number % _IMAGES].copy(), self._decode(data)

@@ -14,6 +14,8 @@ from tautscope.config import Config
 from tautscope.console.programs import programs_of
 from tautscope.loop.kinematics import Kinematics
 
+STATE_PERIOD = 0.02
+"""Time between two states for the page [s]."""
 Mode = Literal["twin", "hardware", "replay"]
 Values = tuple[float, ...]
 """(n,) [m or rad]."""

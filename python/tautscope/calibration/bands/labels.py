@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.images import Image
+from tautscope.calibration.images import SATURATED, Image
 from tautscope.errors import CalibrationError, FieldError
 from tautscope.loop.kinematics import Floats
 
@@ -17,8 +17,6 @@ Mask = NDArray[np.uint8]
 
 BACKGROUND, BAND_A, BAND_B, IGNORED = 0, 1, 2, 255
 """Values of a label image."""
-SATURATED = 250
-"""A pixel with a channel from here on is ignored: overexposed."""
 _RIM = 4
 """Width of what is ignored around a band: its edge is blurred [px]."""
 _MOST_ALIKE = 4.0

@@ -10,15 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.images import Image
+from tautscope.calibration.images import SATURATED, Image
 from tautscope.errors import FieldError, OutputError
 
 MODULES = 8
 """Modules (black or white cells) per side of a square; a marker has 6."""
 LEAST_CORNERS = 8
 """An image with fewer corners of the board is not a view."""
-SATURATED = 250
-"""Grey level from which a pixel is overexposed."""
 LARGEST_SATURATED_SHARE = 0.2
 """A view with more overexposed pixels within its corners is rejected: white spreads over edges."""
 _PIXELS_PER_MODULE = 20

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.camera.board import LARGEST_SATURATED_SHARE, SATURATED, Board, View
-from tautscope.calibration.images import Image
+from tautscope.calibration.camera.board import LARGEST_SATURATED_SHARE, Board, View
+from tautscope.calibration.images import SATURATED, Image
 from tautscope.errors import CalibrationError
 
 _COLUMN_NAMES = ("left", "centre left", "centre right", "right")

@@ -7,6 +7,9 @@ const LENGTH = 600; // samples
 const SAMPLE = 0.04; // s
 const GAP = 1; // s without a sample: another time of a recording
 const FRAME = 40; // ms; one degree of freedom is drawn in each
+const SERIES = { // name in a chart -> in the state
+  reference: "reference", command: "command", tip: "tip", true: "true", without: "uncompensated", minus: "delta_minus", plus: "delta_plus",
+};
 const WITHOUT = { colour: "without", width: 1.5, dash: [5, 3] };
 const TIP = { colour: "tip", width: 2.5 };
 const sign = (name, text) => `<span class="${name}">${text}</span>`;
@@ -23,8 +26,7 @@ export class Charts {
     this.dofs = dofs.map((dof) => ({ ...dof, ...SHOWN[dof.unit] }));
     this.cards = this.dofs.map((dof) => this.#card(dof));
     this.times = [];
-    const names = ["reference", "command", "tip", "true", "without", "minus", "plus"];
-    this.rows = dofs.map(() => Object.fromEntries(names.map((name) => [name, []])));
+    this.rows = dofs.map(() => Object.fromEntries(Object.keys(SERIES).map((name) => [name, []])));
     this.next = 0;
     this.#show(0);
     setInterval(() => this.#draw(), FRAME);
@@ -51,15 +53,11 @@ export class Charts {
     this.times.push(state.time);
     this.parent.classList.toggle("knows", state.true !== null);
     const travel = this.dofs.map(({ scale, size }, k) => {
-      const { reference, command, tip, true: truth, without, minus, plus } = this.rows[k];
-      const shown = (value) => (value === null || value === undefined ? null : scale * value);
-      reference.push(shown(state.reference[k]));
-      command.push(shown(state.command[k]));
-      tip.push(shown(state.tip[k]));
-      truth.push(shown(state.true?.[k]));
-      without.push(shown(state.uncompensated[k]));
-      minus.push(shown(state.delta_minus[k]));
-      plus.push(shown(state.delta_plus[k]));
+      for (const [name, list] of Object.entries(this.rows[k])) {
+        const value = state[SERIES[name]]?.[k] ?? null;
+        list.push(value === null ? null : scale * value);
+      }
+      const { reference } = this.rows[k];
       return Math.abs(reference.at(-1) - (reference.at(-2) ?? reference.at(-1))) / size;
     });
     if (travel[this.shown] === 0 && Math.max(...travel) > 0) this.#show(travel.indexOf(Math.max(...travel)));
