@@ -9,12 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.geometry.checks import (
-    LARGEST_RESIDUAL,
-    check_record,
-    find_doubts,
-    shortness,
-)
+from tautscope.calibration.geometry import checks
+from tautscope.calibration.geometry.checks import check_record
 from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
@@ -144,8 +140,8 @@ def _result(
     active: NDArray[np.bool_],
 ) -> GeometryFit:
     solution, _ = solutions
-    doubts, warnings = find_doubts(model, *solutions, active)
-    if short := shortness(recording):
+    doubts, warnings = checks.find_doubts(model, *solutions, active)
+    if short := checks.shortness(recording):
         warnings.append(short)
     values = estimated_values(config, model, solution, active)
     changes, stds = changes_and_stds(config, model.configured(solution.z), values)
@@ -155,7 +151,7 @@ def _result(
             f"Images are stamped {-delay.after * 1e3:.0f} ms before the motors' clock: "
             "camera.source.delay is set to 0, which cannot express it"
         )
-    explained = solution.residuals[np.abs(solution.residuals).max(axis=1) < LARGEST_RESIDUAL]
+    explained = solution.residuals[np.abs(solution.residuals).max(axis=1) < checks.LARGEST_RESIDUAL]
 
     def per_image(table: Floats) -> Floats:
         whole = np.full((len(recording.captured_at), table.shape[1]), np.nan)

@@ -8,16 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope import _core
-from tautscope.calibration.geometry.parameters import (
-    IMAGE,
-    INDEX,
-    LARGEST_ELASTIC_SHARE,
-    PARAMETERS,
-    TYPICAL_ELASTIC_SHARE,
-    TYPICAL_LAG,
-    configured,
-    prior_std,
-)
+from tautscope.calibration.geometry import parameters
+from tautscope.calibration.geometry.parameters import IMAGE, INDEX, PARAMETERS
 from tautscope.calibration.geometry.recording import Recording
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -65,7 +57,7 @@ class Model:
         self.data = replace(data, time=data.time[::step], motors=data.motors[::step])
         self.count = len(data.captured_at)
         self._config, self._band_distance = config, band_distance
-        self.prior_std = prior_std(by_band_distance=band_distance is not None)
+        self.prior_std = parameters.prior_std(by_band_distance=band_distance is not None)
         self.is_scale_of_drive = band_distance is None
         self._radius = config.instrument.diameter / 2
         self.width_limit = np.array(config.safety.width_limit)
@@ -74,7 +66,7 @@ class Model:
 
     def configured(self, z: Floats) -> Config:
         """The configuration for parameters z in standard deviations of their priors."""
-        return configured(self._config, self._band_distance, z * self.prior_std)
+        return parameters.configured(self._config, self._band_distance, z * self.prior_std)
 
     def features(self, z: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Features (n, 4) and their derivatives (n, 4, 4) by the states (n, 4).
@@ -82,13 +74,10 @@ class Model:
         NaN where a band is not visible.
         """
         slope = (z * self.prior_std)[INDEX["unevenness over bending"]]
-        model = build_feature_model(self.configured(z))
-        predicted, by_q = model.predict_all(states[:, :3], self._unevenness(z, states))
-        shift = np.array([0.0, 0.0, 0.0, _STEP])
-        ahead, behind = (
-            model.predict_all(states[:, :3], self._unevenness(z, states + sign * shift))[0]
-            for sign in (1, -1)
-        )
+        model, unevenness = build_feature_model(self.configured(z)), self._unevenness(z, states)
+        predicted, by_q = model.predict_all(states[:, :3], unevenness)
+        ahead, _ = model.predict_all(states[:, :3], unevenness + _STEP)
+        behind, _ = model.predict_all(states[:, :3], unevenness - _STEP)
         by_unevenness = (ahead - behind) / (2 * _STEP)
         by_state = np.concatenate([by_q, by_unevenness[:, :, None]], axis=2)
         by_state[:, :, Dof.BENDING] += slope * by_unevenness
@@ -109,7 +98,7 @@ class Model:
         ).run(data.motors)
         elastic = self.elastic_share(z)
         tip[:, 0] = (1 - elastic) * tip[:, 0] + elastic * data.motors[:, 0]
-        lags = value[INDEX["camera.source.delay"]] + TYPICAL_LAG * np.exp(of("lag"))
+        lags = value[INDEX["camera.source.delay"]] + parameters.TYPICAL_LAG * np.exp(of("lag"))
         at = [np.interp(data.captured_at - lags[dof], data.time, tip[:, dof]) for dof in Dof]
         start = data.motors[0]
         states = start + np.exp(of("gain")) * (np.stack(at, axis=1) - start) + of("zero")
@@ -117,9 +106,9 @@ class Model:
 
     def elastic_share(self, z: Floats) -> float:
         """Share of insertion's travel that the tip follows within its play."""
-        name = "elastic share insertion"
-        log = float((z * self.prior_std)[INDEX[name]])
-        return min(TYPICAL_ELASTIC_SHARE * float(np.exp(log)), LARGEST_ELASTIC_SHARE)
+        log = (z * self.prior_std)[INDEX["elastic share insertion"]]
+        share = parameters.TYPICAL_ELASTIC_SHARE * float(np.exp(log))
+        return min(share, parameters.LARGEST_ELASTIC_SHARE)
 
     def by_parameters(self, z: Floats, states: Floats, active: NDArray[np.bool_]) -> Floats:
         """Derivatives (n, 4, parameters) of the features by z, with the states at `states`.

@@ -29,8 +29,7 @@ class Parameter:
     Attributes:
         name: Unique; dotted as in TOML where there is such a key.
         std: Prior standard deviation of the difference, in SI units; `prior_std` has the exception.
-        shown: Factor to the shown unit.
-        unit: Shown unit.
+        shown, unit: Factor to the shown unit, and its name.
     """
 
     name: str
@@ -40,29 +39,21 @@ class Parameter:
 
 
 POSE = "camera.camera_from_guide"
-_TRANSLATION = tuple(Parameter(f"{POSE}.translation.{axis}", 4e-3, 1e3, "mm") for axis in "xyz")
-_ROTATION = tuple(Parameter(f"{POSE}.rotation.{axis}", 0.07, 180 / np.pi, "deg") for axis in "xyz")
-_LENGTHS = (
+PARAMETERS = (
+    *(Parameter(f"{POSE}.translation.{axis}", 4e-3, 1e3, "mm") for axis in "xyz"),
+    *(Parameter(f"{POSE}.rotation.{axis}", 0.07, 180 / np.pi, "deg") for axis in "xyz"),
     Parameter("instrument.bending_length", 0.1, 100, "%"),
     Parameter("instrument.marker_a", 0.8e-3, 1e3, "mm"),
     Parameter("instrument.marker_b", 0.8e-3, 1e3, "mm"),
-)
-_CAMERA = (
     Parameter("camera.focal", 0.025, 100, "%"),
     Parameter("camera.fy over fx", 0.01, 100, "%"),
     Parameter("camera.cx", 3.0, 1, "px"),
     Parameter("camera.cy", 3.0, 1, "px"),
     Parameter("camera.distortion.k1", 0.02, 1, "1"),
-)
-_SHAPE = (
     Parameter("unevenness", 0.3, 1, "1"),
     Parameter("unevenness over bending", 0.5, 1, "1/rad"),
-)
-_TIMES = (
     Parameter("camera.source.delay", 0.1, 1e3, "ms"),
     *(Parameter(f"lag {dof.label}", 1.0, 1, "log") for dof in Dof),
-)
-_PLAY = (
     *(Parameter(f"half width {dof.label}", 0.5, 1, "log") for dof in Dof),
     Parameter("elastic share insertion", 1.0, 1, "log"),
     Parameter("shared friction", 1.5, 1, "logit"),
@@ -71,7 +62,6 @@ _PLAY = (
     Parameter("zero rotation", 0.2, 180 / np.pi, "deg"),
     Parameter("zero bending", 0.15, 180 / np.pi, "deg"),
 )
-PARAMETERS = (*_TRANSLATION, *_ROTATION, *_LENGTHS, *_CAMERA, *_SHAPE, *_TIMES, *_PLAY)
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 INDEX = {name: index for index, name in enumerate(NAMES)}
 IMAGE = slice(0, INDEX["unevenness over bending"] + 1)
@@ -118,7 +108,7 @@ def estimated(intrinsics: Intrinsics, *, by_band_distance: bool) -> NDArray[np.b
     if by_band_distance:
         fixed.add("instrument.marker_b")
     if intrinsics != "all":
-        fixed |= {parameter.name for parameter in _CAMERA[1:]}
+        fixed |= {"camera.fy over fx", "camera.cx", "camera.cy", "camera.distortion.k1"}
     if intrinsics == "none":
         fixed.add("camera.focal")
     return np.array([name not in fixed for name in NAMES])

@@ -104,8 +104,10 @@ def solve(
     last_step = float(sizes[RESULTS].max())
     covariance = np.zeros_like(information)
     covariance[pick] = _covariance(information[pick], scores[:, active], model.data.captured_at)
-    section = INDEX["instrument.bending_length"]
-    covariance[section, section] += (_section_shape_std(model, z) / model.prior_std[section]) ** 2
+    section, slope = INDEX["instrument.bending_length"], INDEX["unevenness over bending"]
+    least, per_slope = SECTION_SHAPE_STD
+    shape_std = np.hypot(least, per_slope * z[slope] * model.prior_std[slope])
+    covariance[section, section] += (shape_std / model.prior_std[section]) ** 2
     residuals = model.data.features - model.features(z, images.states)[0]
     return Solution(z, covariance, images.states, residuals, model.expected(z), last_step)
 
@@ -162,12 +164,6 @@ def _covariance(information: Floats, scores: Floats, captured_at: Floats) -> Flo
     # With few blocks the robust one may be too small in some directions.
     scale = np.sqrt(np.maximum(np.diag(inverse) / np.diag(robust), 1.0))
     return np.asarray(robust * np.outer(scale, scale))
-
-
-def _section_shape_std(model: Model, z: Floats) -> float:
-    least, per_slope = SECTION_SHAPE_STD
-    slope = INDEX["unevenness over bending"]
-    return float(np.hypot(least, per_slope * z[slope] * model.prior_std[slope]))
 
 
 def _whitened(model: Model, z: Floats, states: Floats) -> tuple[Floats, Floats]:

@@ -14,6 +14,8 @@ from tautscope.calibration.geometry.parameters import PARAMETERS, POSE
 from tautscope.calibration.geometry.solver import Solution
 from tautscope.config import Config
 
+_LENGTHS = ("bending_length", "marker_a", "marker_b")
+
 
 @dataclass(frozen=True, slots=True)
 class Value:
@@ -21,12 +23,10 @@ class Value:
 
     Attributes:
         name: Parameter.
-        before: Value of the configuration, in SI units; factors of focal lengths.
-        after: Estimated value.
-        prior_std: Standard deviation of `before` that the fit assumed.
-        std: Standard deviation of `after`.
-        shown: Factor to the shown unit.
-        unit: Shown unit.
+        before, prior_std: Value of the configuration, in SI units (factors of focal lengths), and
+            its standard deviation that the fit assumed.
+        after, std: Estimated value, and its standard deviation.
+        shown, unit: Factor to the shown unit, and its name.
     """
 
     name: str
@@ -61,12 +61,9 @@ def estimated_values(
 
 def _values(config: Config, before: Config) -> dict[str, float]:
     """Values of parameters in a configuration; focal lengths are factors to those before."""
-    camera, instrument, old = config.camera, config.instrument, before.camera
-    pose = camera.camera_from_guide
+    camera, old, pose = config.camera, before.camera, config.camera.camera_from_guide
     return {
-        "instrument.bending_length": instrument.bending_length,
-        "instrument.marker_a": instrument.marker_a,
-        "instrument.marker_b": instrument.marker_b,
+        **{f"instrument.{name}": getattr(config.instrument, name) for name in _LENGTHS},
         "camera.focal": camera.fx / old.fx,
         "camera.fy over fx": camera.fy / old.fy * old.fx / camera.fx,
         "camera.cx": camera.cx,
@@ -82,15 +79,15 @@ def changes_and_stds(
 ) -> tuple[dict[str, Any], dict[str, float]]:
     """The keys that were estimated with their values, and standard deviations in their units."""
     known = {value.name: value for value in values}
-    std = {name: value.std for name, value in known.items()}
+    std = {value.name: value.std for value in values}
     camera, instrument, pose = fitted.camera, fitted.instrument, fitted.camera.camera_from_guide
-    delay, lengths = "camera.source.delay", ("bending_length", "marker_a", "marker_b")
+    delay = "camera.source.delay"
     changes: dict[str, Any] = {
         f"{POSE}.translation": list(pose.translation),
         f"{POSE}.rotation": list(pose.rotation),
         delay: max(known[delay].after, 0.0),
     }
-    changes |= {f"instrument.{key}": getattr(instrument, key) for key in lengths}
+    changes |= {f"instrument.{key}": getattr(instrument, key) for key in _LENGTHS}
     # With a measured distance both bands move together.
     std.setdefault("instrument.marker_b", std["instrument.marker_a"])
     stds = {key: std[key] for key in changes if key in std}

@@ -212,16 +212,14 @@ class _Fitting:
 def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
     """Start: the signs of the motors, and the base's pose if it is fitted, by Kabsch's method."""
     names = [each.name for each in parameters]
-    is_free = all(
-        f"kinematics.base_{of}[{k}]" in names for of in ("position", "rotation") for k in range(3)
-    )
+    base = {f"kinematics.base_{of}[{k}]" for of in ("position", "rotation") for k in range(3)}
     noise = np.sqrt(np.einsum("kmm->km", model.covariance))
     best, found = np.inf, model.start()
     trials = sorted(product((1.0, -1.0), repeat=len(model.signs)), key=lambda signs: -sum(signs))
     for signs in trials:
         model.signs = np.array(signs)
         p = model.start()
-        if is_free:
+        if base.issubset(names):
             p = _aligned(model, p, names.index("kinematics.base_position[0]"))
         left = (model.values - model.predict(p, model.motion(p)[0])) / noise
         misfit = float(np.mean(np.abs(left)))

@@ -72,7 +72,10 @@ class Model:
         self._sensor = np.array([each.sensor for each in self.own])
         limits = np.array([dof.width_limit for dof in config.dof])
         self.half_widths = np.outer(limits, np.linspace(0.0, 0.5, PLAYS))
-        self._plays = list(map(_plays, record.commands.T, self.half_widths))
+        self._plays = [
+            [Play(delta_minus=-r, delta_plus=r, output=float(c[0])).run(c) for r in half_widths]
+            for c, half_widths in zip(record.commands.T, self.half_widths, strict=True)
+        ]
         self._names = [each.name for each in parameters]
         self.weights_from = len(parameters)
 
@@ -99,7 +102,9 @@ class Model:
 
     def predict(self, p: Floats, states: Floats) -> Floats:
         """(N, M) values that would be measured in states (N, n), 0 where nothing was."""
-        config = self._configured(p)
+        changes = with_values(self.config, dict(zip(self._names, p.tolist(), strict=False)))
+        own = {key: each for key, each in changes.items() if key.startswith("kinematics.")}
+        config = self.config.replace(**own) if own else self.config
         found = np.zeros(self.values.shape)
         if self._poses.size:
             kinematics = config.kinematics
@@ -142,11 +147,6 @@ class Model:
         columns[:, :, self.weights_from :] = by_weights.reshape(*self.values.shape, -1)
         return columns
 
-    def _configured(self, p: Floats) -> Config:
-        changes = with_values(self.config, dict(zip(self._names, p.tolist(), strict=False)))
-        own = {key: each for key, each in changes.items() if key.startswith("kinematics.")}
-        return self.config.replace(**own) if own else self.config
-
     def _tips(self, config: Config, states: Floats) -> tuple[Floats, Floats]:
         """Positions (N, 3) and rotations (N, 3, 3) in the frame of the kinematics.
 
@@ -178,9 +178,3 @@ def _groups(measurement: Measurement, count: int) -> list[str]:
     if isinstance(measurement, Points):
         return ["point_deviation"] * count
     return (["position_deviation"] * 3 + ["orientation_deviation"] * 3)[:count]
-
-
-def _plays(command: Floats, half_widths: Floats) -> list[Floats]:
-    """Plays (ticks,) that start in their middle, for each half width."""
-    start = float(command[0])
-    return [Play(delta_minus=-r, delta_plus=r, output=start).run(command) for r in half_widths]

@@ -24,8 +24,8 @@ def motor_map(config: Config, found: RobotFit) -> tuple[dict[str, Any], dict[str
     changes: dict[str, Any] = {}
     if actuators is None:
         matrix, offsets = np.eye(len(names)), np.zeros(len(names))
-        changes["actuators.names"] = names
-        changes["actuators.units"] = [str(dof.unit) for dof in config.dof]
+        units = [str(dof.unit) for dof in config.dof]
+        changes = {"actuators.names": names, "actuators.units": units}
     elif actuators.map:
         return {}, {}
     else:

@@ -54,16 +54,12 @@ def fitted(
             found.append(Parameter(f"dof.{dof.name}.lag", 0.0, LAG, 0.0))
     delays = (*config.measurement.delays, *[0.0] * 4)
     found += [Parameter(f"measurement.delays[{k}]", delays[k], DELAY) for k in sensors]
-    if poses or Points in kinds:
-        keys = {
-            "two_planes": ("length", "tip_length", "skew"),
-            "segments": ("length", "tip_length"),
-        }
-        for key in keys.get(kinematics.kind, ()):
+    if (poses or Points in kinds) and kinematics.kind in {"two_planes", "segments"}:
+        for key in ("length", "tip_length"):
             start = getattr(kinematics, key)
-            is_length = key != "skew"
-            std, low = (RELATIVE * start, _SHORTEST) if is_length else (ANGLE, -math.inf)
-            found.append(Parameter(f"kinematics.{key}", start, std, low))
+            found.append(Parameter(f"kinematics.{key}", start, RELATIVE * start, _SHORTEST))
+        if kinematics.kind == "two_planes":
+            found.append(Parameter("kinematics.skew", kinematics.skew, ANGLE))
     if poses:
         found += _vector(config, "base_position", LENGTH) + _vector(config, "base_rotation", ANGLE)
     if any(each.orientation is not None for each in poses):
