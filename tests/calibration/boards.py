@@ -1,7 +1,5 @@
 """Simulated views of a board: corners projected by OpenCV, and rendered images."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from tautscope.calibration.camera.board import MODULES, Board, View

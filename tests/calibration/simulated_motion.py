@@ -1,7 +1,5 @@
 """Calibration records whose truth is known: plays of this folder, centroids by OpenCV's camera."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The bands' colour from motion, clicks and masks; the drawn scene is the ground truth."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The command `tautscope calibrate all`: sequence, resumption, report."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

@@ -1,7 +1,5 @@
 """The command `tautscope calibrate geometry`: what it prints and writes, and when nothing."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Delay and drift of clocks on simulated plays, whose delay is known."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

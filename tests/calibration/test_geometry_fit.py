@@ -1,7 +1,5 @@
 """The fit of the geometry: known truths, the twin, free directions, contradictions, bad input."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

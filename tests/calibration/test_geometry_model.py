@@ -1,7 +1,5 @@
 """The model of the geometry calibration: batches, rotations, derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from play_model import play

@@ -1,7 +1,5 @@
 """Consoles of the twin that tests share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Who may connect: hazards N1, N2 and the limits on what a connection may send."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import socket

@@ -1,7 +1,5 @@
 """The command ``tautscope console``: what it steers, and where it listens."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

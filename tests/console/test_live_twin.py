@@ -1,7 +1,5 @@
 """The twin in real time: stamps and order of its images."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from concurrent.futures import Future

@@ -1,7 +1,5 @@
 """A log on the console's page."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any

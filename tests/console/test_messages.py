@@ -1,7 +1,5 @@
 """Decoding of whatever a page may send, and records in shared memory: hazard G11."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import multiprocessing

@@ -1,7 +1,5 @@
 """The dead man's switch: what may move the reference, for any sequence of events."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

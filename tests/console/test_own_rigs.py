@@ -1,7 +1,5 @@
 """The console of robots with [[dof]]: a rig of one's own, the colonoscope, any number of axes."""
 
-from __future__ import annotations
-
 import multiprocessing
 import re
 import time

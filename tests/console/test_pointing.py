@@ -1,7 +1,5 @@
 """Motion towards a pixel that is held in the image."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Images that cannot be shown, and states that the web server cannot read."""
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 import time

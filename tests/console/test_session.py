@@ -1,7 +1,5 @@
 """The console without a browser: lease, motion, stop, faults of the connection, log."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

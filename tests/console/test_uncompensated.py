@@ -1,7 +1,5 @@
 """The tip without compensation, and the tracking errors with and without it."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

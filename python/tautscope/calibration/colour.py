@@ -1,7 +1,5 @@
 """Calibration of the marker colour: Fisher's linear discriminant of labelled pixels, Eq. (12)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

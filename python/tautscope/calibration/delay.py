@@ -20,8 +20,6 @@ and its scatter is the uncertainty. The turning points give the answer, the mode
 Wrong when the tip follows its plays with a lag of its own, which is then part of the delay.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

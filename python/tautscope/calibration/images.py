@@ -1,7 +1,5 @@
 """Images of a camera as BGR, and image files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

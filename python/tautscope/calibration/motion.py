@@ -1,7 +1,5 @@
 """Motions of a calibration without compensation: references, supervision and records."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future

@@ -1,7 +1,5 @@
 """The tip's state from the bands of one image, without motors and without earlier images."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """What the holder of the lease may request beside motion, and the lease itself."""
 
-from __future__ import annotations
-
 import shlex
 import threading
 import time

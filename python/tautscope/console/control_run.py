@@ -1,7 +1,5 @@
 """One run of the control loop from the console: loop, rig and log, tick by tick."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from concurrent.futures import Executor

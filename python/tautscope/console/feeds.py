@@ -1,7 +1,5 @@
 """States and images to the pages: the newest only, to each page as fast as it takes them."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import time

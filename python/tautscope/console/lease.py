@@ -1,7 +1,5 @@
 """Who may command: one lease, and the check of every command against it."""
 
-from __future__ import annotations
-
 from collections import deque
 
 from tautscope.console.messages import Command, Servo

@@ -1,7 +1,5 @@
 """The simulated instrument in real time, with images rendered in the background."""
 
-from __future__ import annotations
-
 from concurrent.futures import Future
 
 import numpy as np

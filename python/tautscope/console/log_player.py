@@ -1,7 +1,5 @@
 """A log on the console's page, at the pace of its recording."""
 
-from __future__ import annotations
-
 import math
 import time
 from bisect import bisect_left

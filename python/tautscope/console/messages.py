@@ -3,8 +3,6 @@
 Whatever a page sends is decoded into one of these types or refused.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec

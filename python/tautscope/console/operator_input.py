@@ -4,8 +4,6 @@ It runs in the process of the control loop, once per control tick. Whatever happ
 browser, the network or the web server, the reference rests when no acceptable command arrives.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Final
 

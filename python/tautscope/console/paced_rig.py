@@ -1,7 +1,5 @@
 """Any rig in real time, opened as often as the operator enables it."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The files of the page, and the headers that confine it."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 
 from websockets.datastructures import Headers

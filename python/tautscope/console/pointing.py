@@ -1,7 +1,5 @@
 """Motion of the reference towards a pixel of the image, by the loop's model of the image."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Final
 

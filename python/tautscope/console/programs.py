@@ -1,7 +1,5 @@
 """How far an operator may move the reference, and motions that run by themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

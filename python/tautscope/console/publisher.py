@@ -1,7 +1,5 @@
 """Images and what is drawn over them, from the control loop to the web server."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 import threading

@@ -1,7 +1,5 @@
 """The rig and its control loop, switched on and off by the operator."""
 
-from __future__ import annotations
-
 import logging
 import math
 import threading

@@ -4,8 +4,6 @@ Commands are checked for their form here and for everything else in the control 
 process cannot move anything by itself: without fresh commands motion stops.
 """
 
-from __future__ import annotations
-
 import asyncio
 import hmac
 import signal

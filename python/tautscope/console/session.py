@@ -3,8 +3,6 @@
 It shares nothing with the web server but memory, and waits for nothing that the server does.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The state that the control process publishes, and its summary in one line."""
 
-from __future__ import annotations
-
 from msgspec.structs import replace
 
 from tautscope.console.control_run import ControlRun

@@ -4,8 +4,6 @@ Of each ring of records one process writes, one reads; neither waits for the oth
 the writer overwrites while it is read fails its checksum and is not used.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import struct

@@ -1,7 +1,5 @@
 """Start of the console: the web server's process, then the control loop in this one."""
 
-from __future__ import annotations
-
 import multiprocessing
 import secrets
 import socket

@@ -1,7 +1,5 @@
 """The state of the loop as the page shows it."""
 
-from __future__ import annotations
-
 import math
 from itertools import zip_longest
 from typing import Literal

@@ -1,7 +1,5 @@
 """The tip without compensation, for the operator to compare with, and both tracking errors."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Protocol, runtime_checkable
 

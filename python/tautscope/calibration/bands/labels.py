@@ -1,7 +1,5 @@
 """Bands in an image: regions of one colour, and labels of pixels from regions, clicks or masks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

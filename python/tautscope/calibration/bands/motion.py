@@ -1,7 +1,5 @@
 """Bands found by their motion: two regions of one colour that move with the motors."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The colour of the bands from labelled images, and whether it can be told from the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """ROS camera_info files (YAML), as of camera_calibration_parsers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeGuard

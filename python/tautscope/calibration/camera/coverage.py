@@ -1,7 +1,5 @@
 """Choice of views of a board: how well they cover the image, and what to show next."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 

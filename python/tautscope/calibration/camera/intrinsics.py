@@ -1,7 +1,5 @@
 """Intrinsics of a camera from views of a board, with standard deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

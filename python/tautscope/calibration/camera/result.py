@@ -1,7 +1,5 @@
 """A camera calibration as values of the configuration, in the camera model of the loop, Eq. (8)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Checks of a calibration record, and of the result: the cases in which it must not be used."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Fit of the geometry to a calibration record."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any

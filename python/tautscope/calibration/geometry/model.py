@@ -1,7 +1,5 @@
 """Model of a calibration record: features of a state, and the state that the motors let expect."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

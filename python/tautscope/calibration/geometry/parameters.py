@@ -1,7 +1,5 @@
 """Parameters of the geometry calibration: their priors, and what they change in a configuration."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Solver: parameters and the state of every image, from features and motor positions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

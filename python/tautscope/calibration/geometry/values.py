@@ -1,7 +1,5 @@
 """Estimated values before and after, and the keys of the configuration that they change."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

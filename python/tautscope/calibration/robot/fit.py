@@ -1,7 +1,5 @@
 """Fit of kinematics, zeros, gains and delays to a motion, with hysteresis beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

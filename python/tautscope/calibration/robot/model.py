@@ -1,7 +1,5 @@
 """What the sensors of a robot would measure in a motion, and its derivatives by parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

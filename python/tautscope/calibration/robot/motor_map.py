@@ -1,7 +1,5 @@
 """Gains and zeros that a calibration found, as the map of section ``actuators``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters of a robot's calibration: where they start, and how far they may be from there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
