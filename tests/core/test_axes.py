@@ -529,6 +529,15 @@ def test_one_value_that_is_stuck_is_left_out() -> None:
     assert with_it[1] < 0.1 * without[1]
 
 
+def test_without_the_check_of_frozen_sensors_measurements_count_as_they_are() -> None:
+    loops = [
+        HysteresisReduction(axes(2, width_limit=0.9).replace(**{"safety.off": off}))
+        for off in ((), ("frozen",))
+    ]
+    left = [operate(loop, Plays([0.6, 0.5]), on_tip(0.002)) for loop in loops]
+    np.testing.assert_array_equal(left[0], left[1])
+
+
 def test_a_tracker_that_repeats_its_value_is_frozen() -> None:
     loop, plant = HysteresisReduction(axes(1, width_limit=1.0)), Plays([0.5])
     for tick in range(6000):

@@ -119,11 +119,18 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
     for HysteresisReduction<P, S, Repeats<N>, N>
 {
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport {
-        let (mut values, mut covariance) = ([0.0; VALUES], [0.0; VALUES * VALUES]);
-        let is_stuck = self.leave_out_stuck(reading, &mut values);
-        let known = values.get(..reading.values.len());
+        let stuck = self.stuck(reading).unwrap_or_default();
+        let seen = reading.values.iter().zip(stuck);
+        let mut known = seen.clone().filter(|(value, _)| value.is_finite());
+        let is_stuck = stuck.contains(&true) && known.all(|(_, stuck)| stuck);
+        let (mut values, mut covariance) = ([f64::NAN; VALUES], [0.0; VALUES * VALUES]);
+        for (to, (value, stuck)) in values.iter_mut().zip(seen) {
+            if is_stuck || !stuck {
+                *to = *value;
+            }
+        }
         let reading = &Reading {
-            values: known.filter(|_| !is_stuck).unwrap_or(reading.values),
+            values: values.get(..reading.values.len()).unwrap_or(reading.values),
             ..*reading
         };
         let reading = &self.weighed(reading, &mut covariance);
@@ -190,17 +197,10 @@ impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usi
 impl<P, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
     HysteresisReduction<P, S, Repeats<N>, N>
 {
-    /// The values (m,) of a reading, with NaN for those that are stuck; whether all are.
-    fn leave_out_stuck(&mut self, reading: &Reading<'_>, values: &mut [f64; VALUES]) -> bool {
-        let (Some(past), true) = (
-            self.history.at(reading.captured_at),
-            reading.is_consistent(),
-        ) else {
-            return false;
-        };
-        let Some(travel) = self.monitors.frozen_travel() else {
-            return false;
-        };
+    /// Which values of a reading are stuck; None where that is not known.
+    fn stuck(&mut self, reading: &Reading<'_>) -> Option<[bool; VALUES]> {
+        let past = self.history.at(reading.captured_at)?;
+        let travel = self.monitors.frozen_travel()?;
         let at = |state| Sensor::<N, VALUES, 0>::features(reading, &state, &[]);
         let change = |index: usize, from| {
             let ((now, by), (then, _)) = (at(past.command)?, at(from)?);
@@ -208,20 +208,9 @@ impl<P, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
             let most = parts.map(|(by, travel)| by.get(index).map_or(0.0, |by| by.abs() * travel));
             Some((now.get(index)? - then.get(index)?).abs() > most.sum())
         };
-        let stuck = self.view.update(
-            reading.sensor,
-            reading.values,
-            past.command,
-            |index, from| change(index, from).unwrap_or(false),
-        );
-        let all = values.iter_mut().zip(reading.values).zip(stuck);
-        all.for_each(|((to, value), stuck)| *to = if stuck { f64::NAN } else { *value });
-        let mut known = reading
-            .values
-            .iter()
-            .zip(stuck)
-            .filter(|(value, _)| value.is_finite());
-        stuck.contains(&true) && known.all(|(_, stuck)| stuck)
+        let is_far = |index, from| change(index, from).unwrap_or(false);
+        let (sensor, command) = (reading.sensor, past.command);
+        Some(self.view.update(sensor, reading.values, command, is_far))
     }
 
     /// A reading with the covariance that its sensor has shown to have.

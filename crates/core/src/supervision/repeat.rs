@@ -64,7 +64,8 @@ impl<const N: usize> Repeats<N> {
         let repeats = self.0.get_mut(sensor).into_iter().flatten();
         let all = stuck.iter_mut().zip(values).zip(repeats).enumerate();
         for (index, ((stuck, value), repeat)) in all {
-            *stuck = repeat.update(*value, command, |from| is_far(index, from));
+            *stuck =
+                value.is_finite() && repeat.update(*value, command, |from| is_far(index, from));
         }
         stuck
     }
