@@ -50,7 +50,7 @@ def try_file(file: Path, is_whole: bool) -> Outcome:
     """List a file and judge its first pair, or analyse it in full."""
     try:
         status, text = _command("analyze", file, "--json")
-        if status == 2 and text.startswith("error: ") and text.count("\n") == 1:
+        if status == 2 and text.startswith("error: ") and "Traceback" not in text:
             return Outcome("refused", text)
         if status != 0:
             return Outcome("FAILED", f"exit status {status}: {text}")
