@@ -49,7 +49,7 @@ dl { display: grid; grid-template-columns: max-content auto; gap: .1rem 1.5rem; 
 dt { color: #555; } dd { margin: 0; }
 @media (max-width: 45rem) { body { padding: 0 1rem; } .first { padding-left: .5rem; }
   td:first-child { white-space: normal; }
-  figure { overflow-x: auto; } figure img { min-width: 40rem; }
+  figure { overflow-x: auto; } figure img:not([src^="data:image/gif"]) { min-width: 40rem; }
   figcaption { position: sticky; left: 0; max-width: calc(100vw - 2rem); }
   .meanings :is(th, td):nth-child(n) { min-width: 0; white-space: normal; font-size: .8rem; }
   .figures td:first-child { position: sticky; left: 0; min-width: 7rem; background: #fff; } }
