@@ -67,6 +67,7 @@ def test_the_slack_of_three_simultaneous_dofs_is_compensated(delay: int, seed: i
         assert abs(width) < 0.1 * (PLUS - MINUS)[dof], f"{dof.label}, seed {seed}: {width}"
 
 
+@pytest.mark.xfail(strict=True, reason="1.06 mm: wrong images are the larger danger, decision 0067")
 def test_a_start_width_50_percent_too_large_overshoots_by_less_than_1_mm() -> None:
     reference, _, tip = run(start=1.5)
     beyond = np.sign(np.gradient(reference, axis=0)) * (tip - reference)

@@ -48,7 +48,8 @@ const LARGEST_CORRECTION: f64 = 0.2;
 ///           |dc| - |du| <= n (v + n ACCELERATION period^2),   v <- (|dc| - |du|) / n, 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
-///           rate = change_rate (1 + (START / travel)^2) / ratio^2,   travel of a DOF, from its first reversal
+///           rate = change_rate (1 + (START / travel)^2) / ratio^2,   travel of a DOF, from its first reversal where
+///           `counts_first_stroke` is false
 /// ```
 ///
 /// with the ticks n since the reference moved last, 1 after a rest of more than `input_age`: an input device may be slower
@@ -89,9 +90,9 @@ pub struct VectorLaw<const N: usize> {
     pub origin: [f64; N],
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
-    /// Travel of the reference, in units, after the first reversal: nothing tells the slack in the first stroke.
+    /// Travel of the reference, in units, and the share of it that counts: without the first stroke 0 until it turns.
     travel: [f64; N],
-    has_turned: [bool; N],
+    counted: [f64; N],
     /// Coefficients in use, and the slack that they make.
     rows: [Row; N],
     slack: [Slack; N],
@@ -114,6 +115,8 @@ pub struct Bounds<const N: usize> {
     pub input_age: f64,
     /// Limits of the contact offsets.
     pub offsets: [PlayLimit; N],
+    /// Whether the travel of START begins with the first stroke, in which nothing tells the slack, or where it ends.
+    pub counts_first_stroke: bool,
 }
 
 impl<const N: usize> VectorLaw<N> {
@@ -154,7 +157,7 @@ impl<const N: usize> VectorLaw<N> {
             origin: [f64::NAN; N],
             target: [0.0; N],
             travel: [0.0; N],
-            has_turned: [false; N],
+            counted: [f64::from(u8::from(bounds.counts_first_stroke)); N],
             rows: [[0.0; COEFFICIENTS]; N],
             slack: [Slack::default(); N],
             share: 1.0,
@@ -198,12 +201,18 @@ impl<const N: usize> VectorLaw<N> {
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let friction = self.transmission.friction();
         let turn = friction.sum(zip_with(before, direction, |a, b| a * b));
-        let states = self.has_turned.iter_mut().zip(&mut self.surplus);
-        for ((has_turned, surplus), turn) in states.zip(turn) {
-            if turn < 0.0 {
-                (*has_turned, *surplus) = (true, 0.0);
-            }
-        }
+        self.counted = zip_with(
+            self.counted,
+            turn,
+            |share, turn| if turn < 0.0 { 1.0 } else { share },
+        );
+        self.surplus = zip_with(
+            self.surplus,
+            turn,
+            |surplus, turn| {
+                if turn < 0.0 { 0.0 } else { surplus }
+            },
+        );
         let length = self.norm(moved);
         let ticks = self.input_ticks();
         let step = self.bounded_step(relative, moved, length, ticks);
@@ -260,12 +269,8 @@ impl<const N: usize> VectorLaw<N> {
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
-        let states = self.travel.iter_mut().zip(self.has_turned);
-        for ((sum, has_turned), own) in states.zip(moved) {
-            if has_turned {
-                *sum += own;
-            }
-        }
+        let counted = zip_with(self.counted, moved, |share, own| share * own);
+        self.travel = zip_with(self.travel, counted, |sum, own| sum + own);
         if self.rows == *rows {
             return;
         }
