@@ -200,11 +200,13 @@ impl<const N: usize> VectorLaw<N> {
         let taken = subtract(target, self.target);
         self.is_limited = taken.iter().any(|taken| taken.abs() > HARM);
         let friction = self.transmission.friction();
-        let turn = friction.sum(zip_with(before, direction, |a, b| a * b));
+        // Of DOFs that share a friction the direction may turn without a reversal of the whole.
+        let own = zip_with(before, direction, |a, b| a * b);
+        let turn = friction.sum(own);
         self.counted = zip_with(
             self.counted,
-            turn,
-            |share, turn| if turn < 0.0 { 1.0 } else { share },
+            own,
+            |share, own| if own < 0.0 { 1.0 } else { share },
         );
         self.surplus = zip_with(
             self.surplus,

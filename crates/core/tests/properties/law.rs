@@ -374,6 +374,40 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
     }
 }
 
+/// Two DOFs of one friction on a circle: each reverses, the direction of both never does.
+#[test]
+fn a_direction_that_turns_round_ends_the_start() {
+    let friction = Friction::new([0, 0], [1.0, 1.0]).unwrap();
+    let own = settings(&safety()).law;
+    let bounds = Bounds {
+        width_limit: [10.0; 2],
+        speed: [f64::MAX; 2],
+        period: PERIOD,
+        input_age: 0.05,
+        offsets: [PlayLimit::new(10.0, 10.0).unwrap(); 2],
+        counts_first_stroke: false,
+    };
+    let transmission = Transmission::new(friction, [1.0; 2]).unwrap();
+    let mut law = VectorLaw::new(own, transmission, &bounds).unwrap();
+    let mut rows = [[0.0; COEFFICIENTS]; 2];
+    for row in &mut rows {
+        row[SHARED] = 1.0;
+    }
+    for tick in 0..20_000 {
+        if tick == 19_000 {
+            rows[0][OFFSET] = 0.5;
+        }
+        let angle = 0.01 * f64::from(tick);
+        let reference = [angle.cos(), angle.sin()];
+        let command = law.propose(reference, &rows, 1.0);
+        law.commit(command);
+        // Both travel 1.42 per radian at most.
+        let most = 1.1 * own.change_rate * 1.42 * 0.01 * f64::from((tick - 19_000).max(0));
+        let lead = (command[0] - reference[0]).abs();
+        assert!(lead <= most + 0.02, "{tick}: {lead} {most}");
+    }
+}
+
 /// Compensation that is switched off: the command returns to the reference within a travel of twice the lead.
 #[test]
 fn without_compensation_the_command_returns_to_the_reference() {
