@@ -19,7 +19,8 @@ use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
 use crate::supervision::monitors::SENSORS;
-pub use crate::supervision::repeat::{Repeats, VALUES};
+pub use crate::supervision::monitors::VALUES;
+pub use crate::supervision::repeat::Repeats;
 
 /// Standard deviation by a measurement alone, in units, up to which it determines a DOF.
 const OBSERVABLE: f64 = 0.5;
@@ -384,13 +385,13 @@ impl Reading<'_> {
             let rows = observed.linearize(self, &Prior::at(state), observed.seen, &[0.0; N])?;
             let fitted = compressed(rows);
             let known = fitted.by_state.diagonal().map(|entry| entry != 0.0);
-            let spare = seen.checked_sub(known.iter().filter(|known| **known).count());
-            let spare = spare.filter(|spare| *spare > 0)?;
+            let rank = known.iter().filter(|known| **known).count();
+            let redundant = seen.checked_sub(rank).filter(|count| *count > 0)?;
             let at = SVector::from(state);
             let whole = (rows.value - rows.by_state * at).norm_squared();
             let explained = (fitted.value - fitted.by_state * at).norm_squared();
             #[expect(clippy::cast_precision_loss, reason = "a small number")]
-            let mean = (whole - explained).max(0.0) / spare as f64;
+            let mean = (whole - explained).max(0.0) / redundant as f64;
             misfit = Some(mean);
             (state, _) = least_squares(&fitted, state, known.into())?;
         }

@@ -19,6 +19,8 @@ use crate::supervision::supervisor::{Event, Supervision, Supervisor};
 
 /// Sensors that a loop may have, each with its own rate and delay.
 pub const SENSORS: usize = 4;
+/// Most values of a measurement.
+pub const VALUES: usize = 16;
 /// Travel of a DOF, in `width_limit`, in which a measurement should have determined it.
 const UNSEEN: f64 = 0.25;
 

@@ -1,9 +1,6 @@
 //! Repeats of a sensor's value.
 
-use crate::supervision::monitors::SENSORS;
-
-/// Most values of a measurement.
-pub const VALUES: usize = 16;
+use crate::supervision::monitors::{SENSORS, VALUES};
 
 /// A value that a sensor repeats bit for bit, and the command since when.
 ///

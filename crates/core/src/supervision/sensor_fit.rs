@@ -15,10 +15,9 @@ const OFF: f64 = 9.0;
 ///
 /// with the residual r of the n-th measurement of k values in the state that fits it best, and their covariance R. A tracker
 /// whose zero is off, and kinematics that are not those of the robot, contradict each measurement: with R max(s^2, 1) they
-/// weigh less, and each value as much as told over the others. An outlier is what is beyond
-/// that, in less than half of the measurements.
+/// weigh less, in the told proportions. What is beyond that in less than half of the measurements remains an outlier.
 ///
-/// Blind to errors that some state explains: of a sensor with no more values than DOFs to all.
+/// Blind to errors that some state explains: to all, if the sensor has no more values than the DOFs need.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorFit {
     count: f64,
