@@ -21,7 +21,8 @@ const STEPS: usize = 5;
 const EARLY: f64 = 2.0;
 /// Distance from the origin, in units, at which a change of the gain counts as one of the tip.
 const FAR: f64 = 2.0;
-/// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
+/// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known, and
+/// only the first reversal tells its slack.
 const START: f64 = 7.0;
 /// Largest rate at which the command's speed grows beyond the reference's, in `width_limit` / s^2: a tremor, which reverses
 /// ten times a second, must not drive the motors across the slack each time.
@@ -48,8 +49,7 @@ const LARGEST_CORRECTION: f64 = 0.2;
 ///           |dc| - |du| <= n (v + n ACCELERATION period^2),   v <- (|dc| - |du|) / n, 0 when w reverses
 /// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
 /// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
-///           rate = change_rate (1 + (START / travel)^2) / ratio^2,   travel of a DOF, from its first reversal where
-///           `counts_first_stroke` is false
+///           rate = change_rate (1 + (START / travel)^2) / ratio^2,   travel of a DOF, from its first reversal anew
 /// ```
 ///
 /// with the ticks n since the reference moved last, 1 after a rest of more than `input_age`: an input device may be slower
@@ -90,9 +90,9 @@ pub struct VectorLaw<const N: usize> {
     pub origin: [f64; N],
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
-    /// Travel of the reference, in units, and the share of it that counts: without the first stroke 0 until it turns.
+    /// Travel of the reference, in units, since the start or the first reversal.
     travel: [f64; N],
-    counted: [f64; N],
+    has_turned: [bool; N],
     /// Coefficients in use, and the slack that they make.
     rows: [Row; N],
     slack: [Slack; N],
@@ -115,8 +115,6 @@ pub struct Bounds<const N: usize> {
     pub input_age: f64,
     /// Limits of the contact offsets.
     pub offsets: [PlayLimit; N],
-    /// Whether the travel of START begins with the first stroke, in which nothing tells the slack, or where it ends.
-    pub counts_first_stroke: bool,
 }
 
 impl<const N: usize> VectorLaw<N> {
@@ -157,7 +155,7 @@ impl<const N: usize> VectorLaw<N> {
             origin: [f64::NAN; N],
             target: [0.0; N],
             travel: [0.0; N],
-            counted: [f64::from(u8::from(bounds.counts_first_stroke)); N],
+            has_turned: [false; N],
             rows: [[0.0; COEFFICIENTS]; N],
             slack: [Slack::default(); N],
             share: 1.0,
@@ -203,11 +201,12 @@ impl<const N: usize> VectorLaw<N> {
         // Of DOFs that share a friction the direction may turn without a reversal of the whole.
         let own = zip_with(before, direction, |a, b| a * b);
         let turn = friction.sum(own);
-        self.counted = zip_with(
-            self.counted,
-            own,
-            |share, own| if own < 0.0 { 1.0 } else { share },
-        );
+        let starts = self.travel.iter_mut().zip(&mut self.has_turned);
+        for ((travel, has_turned), own) in starts.zip(own) {
+            if own < 0.0 && !*has_turned {
+                (*travel, *has_turned) = (0.0, true);
+            }
+        }
         self.surplus = zip_with(
             self.surplus,
             turn,
@@ -271,8 +270,7 @@ impl<const N: usize> VectorLaw<N> {
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let moved = over(motion.map(f64::abs), self.transmission.unit());
         let travel: f64 = moved.iter().sum();
-        let counted = zip_with(self.counted, moved, |share, own| share * own);
-        self.travel = zip_with(self.travel, counted, |sum, own| sum + own);
+        self.travel = zip_with(self.travel, moved, |sum, own| sum + own);
         if self.rows == *rows {
             return;
         }

@@ -234,8 +234,6 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Best<N, M, 
             period: settings.control.period,
             input_age: settings.safety.reference_age,
             offsets: limits,
-            // With images the other rule is not measured enough: decision 0079.
-            counts_first_stroke: G > 0,
         };
         Ok(Self {
             law: VectorLaw::new(settings.law, transmission, &bounds)?,

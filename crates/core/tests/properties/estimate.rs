@@ -264,7 +264,6 @@ fn soak(truth: Truth, ticks: u32, mut reference: impl FnMut(u32) -> f64) -> [f64
         period: 0.005,
         input_age: 0.05,
         offsets: [PlayLimit::new(3.0 * UNIT, 2.0 * UNIT).unwrap()],
-        counts_first_stroke: false,
     };
     let own = settings(&safety()).law;
     let mut law = VectorLaw::new(own, direct.estimate.transmission, &bounds).unwrap();

@@ -41,7 +41,6 @@ impl CheckedLaw {
             offsets: [0, 1, 2].map(|dof| {
                 PlayLimit::new(width_limit[dof], settings.safety.offset_limit[dof]).unwrap()
             }),
-            counts_first_stroke: true,
         };
         let start = dofs().map(|dof| dof.start_deviation);
         let mut estimate = Estimate::new(
