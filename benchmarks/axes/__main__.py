@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from axes import colonoscope, start
+from axes import colonoscope, sensor_faults, start
 from axes.tracking import PLANTS, Job, bound, simulate, times
 from common.doc_pages import insert
 from common.paths import ROOT
@@ -98,6 +98,7 @@ def main() -> None:
         "--colonoscope", action="store_true", help="the simulated colonoscope in place of plays"
     )
     parser.add_argument("--start", action="store_true", help="the first 40 s of 60 drawn plays")
+    parser.add_argument("--faults", action="store_true", help="of the sensor, with 40 seeds each")
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     if options.colonoscope:
@@ -121,6 +122,22 @@ def main() -> None:
         if options.write:
             head = f"Seeds {drawn[0]} to {drawn[-1]}; median, 10th percentile.\n\n"
             insert(ROOT / "docs" / "plants.md", "start", head + text)
+        print(text)
+        return
+    if options.faults:
+        drawn = range(options.first_seed, options.first_seed + sensor_faults.SEEDS)
+        faults = [
+            sensor_faults.Job(kind, is_early, seed)
+            for kind in sensor_faults.KINDS
+            for is_early in (True, False)
+            for seed in drawn
+        ]
+        moved = dict(
+            run_parallel(sensor_faults.simulate, faults, options.workers, options.scheduler)
+        )
+        text = sensor_faults.table({job: moved[job] for job in faults})
+        if options.write:
+            insert(ROOT / "docs" / "faults.md", "sensors", text)
         print(text)
         return
     counts = [options.dofs] if options.dofs else COUNTS
