@@ -52,6 +52,9 @@ const OF_ARTICLE: [&str; 11] = [
 ];
 /// Sections that a loop with `[[dof]]` reads.
 const OF_AXES: [&str; 5] = ["control", "safety", "law", "estimation", "measurement"];
+/// Sections that only the other kind of loop uses, with `[[dof]]` and without.
+const UNUSED_BY_AXES: [&str; 4] = ["insertion", "rotation", "bending", "instrument"];
+const UNUSED_BY_ARTICLE: [&str; 2] = ["kinematics", "measurement"];
 /// Most characters of a name, as in `python/tautscope/config/axes.py`.
 const MOST_CHARACTERS: usize = 32;
 
@@ -93,7 +96,7 @@ impl Configuration {
                 Some(section) if read.contains(&name) => {
                     merge(section, &own, name, &[], has_axes)?;
                 }
-                Some(_) => {}
+                Some(default) => check_unused(name, &own, default, has_axes)?,
             }
         }
         let dofs = if has_axes {
@@ -115,6 +118,7 @@ impl Configuration {
         if !self.has_axes() {
             return self.check_article();
         }
+        let mut dofs = Vec::<AxisSettings>::new();
         for (index, entry) in self.table["dof"]
             .as_array()
             .into_iter()
@@ -128,7 +132,9 @@ impl Configuration {
                 .map_err(|error| Error::of_value(&error, &path))?;
             dof.check(entry["unit"].as_str() == Some("m"))
                 .map_err(|error| Error(format!("{path}{error}")))?;
+            dofs.push(dof);
         }
+        check_friction(&dofs)?;
         let Delays {
             control,
             measurement,
@@ -308,6 +314,41 @@ fn check_actuators(own: &Value) -> Result<(), Error> {
     Err(Error(
         "actuators: got keys, expected none: rigs whose motors are not the degrees of freedom are in Python only".into(),
     ))
+}
+
+/// Refuses the name of a friction that none shares, and a lever without one.
+fn check_friction(dofs: &[AxisSettings]) -> Result<(), Error> {
+    for (index, dof) in dofs.iter().enumerate() {
+        let (path, name, lever) = (format!("dof[{index}]"), &dof.friction, dof.lever);
+        let count = dofs.iter().filter(|other| other.friction == *name).count();
+        #[expect(clippy::float_cmp, reason = "the default")]
+        if name.is_empty() && lever != 1.0 {
+            return Err(Error(format!(
+                "{path}.lever: got {lever}, expected its default: {path} shares no friction"
+            )));
+        }
+        if !name.is_empty() && count == 1 {
+            return Err(Error(format!(
+                "{path}.friction: got {name:?}, expected the name of two or more DOFs"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses values other than the defaults in a section of the other kind of loop.
+fn check_unused(name: &str, own: &Value, default: &Value, has_axes: bool) -> Result<(), Error> {
+    let (unused, with): (&[&str], _) = if has_axes {
+        (&UNUSED_BY_AXES, "with")
+    } else {
+        (&UNUSED_BY_ARTICLE, "without")
+    };
+    for (key, value) in own.as_table().into_iter().flatten() {
+        if unused.contains(&name) && default.get(key) != Some(value) {
+            return Err(Error(format!("{name}.{key}: not used {with} [[dof]]")));
+        }
+    }
+    Ok(())
 }
 
 fn check_kinematics(own: &Value) -> Result<(), Error> {

@@ -61,7 +61,7 @@ fn degrees_of_freedom_have_names_units_and_defaults() {
         [law]
         change_rate = 0.1
         [rotation]
-        gain_limit = 4.0
+        gain_limit = 5.0
     "#;
     let configuration = Configuration::parse(text).unwrap();
     let found = configuration.dofs().iter();
@@ -327,6 +327,28 @@ fn numbers_have_the_ranges_of_python() {
             "dof[0].lever: got 101, expected 0 to 100",
         ),
         (dof("[safety]\nstall = 1e4"), "safety.stall: got 10000"),
+    ]);
+}
+
+#[test]
+fn what_has_no_effect_is_refused() {
+    check_errors(&[
+        (
+            format!("{ONE}lever = 2.0"),
+            "dof[0].lever: got 2, expected its default: dof[0] shares no friction",
+        ),
+        (
+            format!("{ONE}friction = \"shaft\""),
+            "dof[0].friction: got \"shaft\", expected the name of two or more DOFs",
+        ),
+        (
+            format!("{ONE}[rotation]\ngain_limit = 4.0"),
+            "rotation.gain_limit: not used with [[dof]]",
+        ),
+        (
+            "[measurement]\ndelays = [0.1]".into(),
+            "measurement.delays: not used without [[dof]]",
+        ),
     ]);
 }
 

@@ -67,23 +67,39 @@ def check_axes(
     if not dofs:
         return
     require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} entries", f"1 to {MOST_DOFS}")
+    frictions = [dof.friction for dof in dofs]
     for index, dof in enumerate(dofs):
-        names = [other.name for other in dofs[:index]]
-        require(dof.name not in names, f"dof[{index}].name", dof.name, "a name used once")
+        path, names = f"dof[{index}]", [other.name for other in dofs[:index]]
+        require(dof.name not in names, f"{path}.name", dof.name, "a name used once")
+        is_shared = not dof.friction or frictions.count(dof.friction) > 1
+        require(is_shared, f"{path}.friction", dof.friction, "the name of two or more DOFs")
+        allowed = f"its default: {path} shares no friction"
+        require(bool(dof.friction) or dof.lever == 1.0, f"{path}.lever", dof.lever, allowed)
     require_defaults(safety, "safety", _OF_THE_ARTICLE, "[[dof]] has its own")
+
+
+def check_unused(config: Struct) -> None:
+    """Refuse values in sections that robots with [[dof]] do not use, or the others."""
+    has_dofs: bool = bool(config.dof)  # type: ignore[attr-defined]
+    article = ("insertion", "rotation", "bending", "instrument")
+    unused: Sequence[str] = article if has_dofs else ("kinematics", "measurement")
+    allowed = f"its default: not used with{'' if has_dofs else 'out'} [[dof]]"
+    for section in fields(type(config)):
+        if section.name in unused:
+            own, default = getattr(config, section.name), default_of(section)
+            for key in (one.name for one in fields(own)):
+                value = getattr(own, key)
+                require(value == getattr(default, key), f"{section.name}.{key}", value, allowed)
 
 
 _TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
-def check_topics(
-    dofs: Sequence[DofEntry], kinematics: KinematicsConfig, measurement: MeasurementConfig
-) -> None:
+def check_topics(kinematics: KinematicsConfig, measurement: MeasurementConfig) -> None:
     """Check measurement.topics."""
     for index, topic in enumerate(measurement.topics):
         path = f"measurement.topics[{index}]"
         names = [other.name for other in measurement.topics[:index]]
-        require(bool(dofs), path, topic.name, "none without [[dof]]")
         require(topic.name not in names, f"{path}.name", topic.name, "a topic named once")
         allowed = "a topic as /tracker/pose: letters, digits and underscores between slashes"
         require(bool(_TOPIC.fullmatch(topic.name)), f"{path}.name", topic.name, allowed)

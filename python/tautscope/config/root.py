@@ -12,7 +12,13 @@ from tautscope.config.actuators import ActuatorsConfig, check_actuators, check_m
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import check_axes, check_ranges, check_references, check_topics
+from tautscope.config.checks import (
+    check_axes,
+    check_ranges,
+    check_references,
+    check_topics,
+    check_unused,
+)
 from tautscope.config.control import ControlConfig, DofConfig, EstimationConfig, LawConfig
 from tautscope.config.drive_defaults import with_drive_defaults
 from tautscope.config.drives import DrivesConfig
@@ -83,7 +89,8 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
         check_axes(self.dof, self.kinematics, self.safety)
         check_ranges(self)
-        check_topics(self.dof, self.kinematics, self.measurement)
+        check_unused(self)
+        check_topics(self.kinematics, self.measurement)
         stall, least = self.safety.stall, 2 * self.control.period
         allowed = f"at least {least:g}, two of control.period: each tick would stop the motion"
         require(stall >= least, "safety.stall", stall, allowed)
