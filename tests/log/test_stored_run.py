@@ -1,6 +1,7 @@
 """Stored runs, and `tautscope report`; the recording in memory is the oracle."""
 
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.loop.references import SineSequence
 from tautscope.loop.rig import Sample
 from tautscope.report.recorded_run import RecordedRun
+from tautscope.report.report import report_time
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
 
@@ -88,6 +90,9 @@ def test_report_of_a_run_folder(
     assert {path.name for path in out.iterdir()} == names
     page = (out / "report.html").read_text()
     assert "Of the true tip" in page
+    began = read_run(folder).main.began
+    assert began is not None and abs(datetime.now(UTC) - began) < timedelta(hours=1)
+    assert f"<dt>began</dt><dd>{report_time(began)}</dd>" in page
     assert "http" not in page.replace("http-equiv", "")
     assert main(["report", str(folder), "--out", str(tmp_path / "second")]) == 0
     assert "reduction" in capsys.readouterr().out

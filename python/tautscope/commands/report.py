@@ -35,13 +35,16 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.log.stored_run import read_run  # noqa: PLC0415
+    from tautscope.report.report import report_time  # noqa: PLC0415
 
     folder = arguments.out_folder(options)
     run = read_run(options.path, options.uncompensated)
     recording = run.main
     time, seen = recording.trace["time"], "measurements" if recording.config.dof else "images"
+    began = {} if recording.began is None else {"began": report_time(recording.began)}
     facts = {
         "run": str(run.source),
+        **began,
         "recorded": f"{time[-1] - time[0]:.1f} s, {len(recording.frames)} {seen}",
     }
     with new_folder(folder) as place:

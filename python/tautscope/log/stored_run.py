@@ -1,6 +1,7 @@
 """A run as it is stored: a log, a run folder, or a folder of tables."""
 
 from dataclasses import replace
+from datetime import datetime
 from os import PathLike
 from pathlib import Path
 
@@ -87,7 +88,10 @@ def _from_log(path: Path) -> Recording:
         found.append(f"{path.name} is damaged or truncated: {log.damage}")
     if log.missing:
         found.append(f"{log.missing} ticks or updates of the run are not in {path.name}")
-    return replace(recording, warnings=tuple(found), snapshot=_snapshot(log, recording))
+    began = datetime.fromtimestamp(log.clock.epoch / 1e9).astimezone()
+    return replace(
+        recording, warnings=tuple(found), snapshot=_snapshot(log, recording), began=began
+    )
 
 
 def _updates(log: Log) -> list[tuple[int, Update]]:

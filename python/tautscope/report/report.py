@@ -6,6 +6,7 @@ import base64
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
@@ -93,7 +94,8 @@ estimated.</p>
 
 
 def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
-    """The page around a body, with the facts of the run and its configuration."""
+    """The page around a body, with the facts of the run, its date and its configuration."""
+    facts = facts | {"written": report_time(datetime.now())}
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return document(
         f"Hysteresis reduction from {'measurements of the tip' if config.dof else _IMAGES}",
@@ -104,6 +106,11 @@ def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
 <dl>{facts_list}</dl>
 {configuration(config)}""",
     )
+
+
+def report_time(time: datetime) -> str:
+    """A date and time with the offset of the zone, to the minute."""
+    return time.astimezone().isoformat(" ", "minutes")
 
 
 def configuration(config: Config) -> str:

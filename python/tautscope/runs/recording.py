@@ -4,6 +4,7 @@ import csv
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import datetime
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -89,6 +90,7 @@ class Recording:
         snapshot: One frame from about the middle; not saved.
         warnings: A line for each disabled monitor, and for each flag raised
             (`tautscope.runs.flag_summary`); not saved.
+        began: When, if it was read from a log; not saved.
     """
 
     trace: Table
@@ -98,6 +100,7 @@ class Recording:
     segments: tuple[Segment, ...]
     snapshot: Snapshot | None = None
     warnings: tuple[str, ...] = ()
+    began: datetime | None = None
 
     def __repr__(self) -> str:
         time = self.trace["time"]
