@@ -48,7 +48,7 @@ class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Window of ``clock = "stream"`` [s]."""
     delay: Annotated[float, Meta(ge=0, le=10)] = 0.0
     """Time from exposure to stamp for ``device``, else lowest time from exposure to arrival [s], by
-    `tautscope calibrate geometry`."""
+    `tautscope calibrate latency` or `geometry`."""
     timeout: Positive = 2.0
     """Time without a frame after which the source is opened again [s]."""
     reconnect_period: Positive = 0.5
