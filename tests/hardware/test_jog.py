@@ -12,6 +12,7 @@ from tautscope.bench.can_bus import Hub
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.cli import main
 from tautscope.config import dump_config, from_document
+from tautscope.dof import Dof
 from tautscope.hardware import jog
 
 Bench = Callable[..., SimulatedDrives]
@@ -64,6 +65,20 @@ def test_nothing_moves_without_a_yes(
     assert main(["jog", "rotation", "0.1", "--config", rig]) == 2
     assert "nothing moved" in capsys.readouterr().err
     assert not any(event.what == "operation enabled" for event in drives.events)
+
+
+def test_faults_are_reset_only_if_told(
+    rig: str, bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drives = bench(from_document({"drives": drives_document(channel="unused")}).drives)
+    monkeypatch.setattr(jog, "DURATION", 1.0)
+    drives.inject("fault", Dof.INSERTION)
+    drives.clear(Dof.INSERTION)
+    command = ["jog", "rotation", "0.1", "--config", rig, "--yes"]
+    assert main(command) == 3
+    assert "jog with --reset-faults" in capsys.readouterr().err
+    assert not any(event.what == "operation enabled" for event in drives.events)
+    assert main([*command, "--reset-faults"]) == 0
 
 
 def test_placeholders_of_the_drives_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,6 +41,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "move a degree of freedom of a rig of your own with [[dof]], and print what its sensors "
         "measured",
     )
+    jog.add_argument(
+        "--reset-faults",
+        action="store_true",
+        help="reset faults of the drives first; find their cause before; not with --rig",
+    )
     jog.add_argument("--yes", action="store_true", help="start without asking")
     arguments.add_config(jog, required=True)
     arguments.add_json(jog)
@@ -61,9 +66,12 @@ def _jog(options: argparse.Namespace) -> None:
     dof = config.dofs[index]
     if options.rig is None and config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors, or --rig")
+    if options.rig is not None and options.reset_faults:
+        raise FieldError("--reset-faults", options.rig, "no --rig, which starts its motors itself")
     check_distance(dof, distance)
     refuse_wrong_limits(options.config)
     before = "After a reset, which may move all motors to their start, " if options.rig else ""
+    before = "Faults of all drives are reset. " if options.reset_faults else before
     question = f"{before}{dof.label} will move by {display_text([distance], [dof])} and back."
     confirm(question, options, config.camera)
     seen: list[SensorMotion] = []
@@ -75,7 +83,8 @@ def _jog(options: argparse.Namespace) -> None:
             rig.close()
     else:
         assert config.drives is not None
-        largest, end = jog(config.drives, Dof(index), distance)
+        drives, motor, reset = config.drives, Dof(index), options.reset_faults
+        largest, end = jog(drives, motor, distance, reset_faults=reset)
     found = {"dof": dof.label, "moved": largest, "ended_at": end}
     sensors = {"sensors": [asdict(each) for each in seen]} if options.rig else {}
     print_json(options, found | sensors)

@@ -11,7 +11,10 @@ from tautscope.dof import Motor
 from tautscope.errors import DriveError, StateError
 from tautscope.hardware.cia402 import FOLLOWING_ERROR_BIT, Mode
 
-RESET = "power-cycle it, or in Python call Drives.start(reset_faults=True)"
+RESET = (
+    "power-cycle it, or run tautscope jog with --reset-faults, in Python "
+    "Drives.start(reset_faults=True)"
+)
 """How a fault is reset, for messages, after its cause has been found."""
 _RESTS = 3
 """Cycles without motion that show rest; a drive may report one position twice."""

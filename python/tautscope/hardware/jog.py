@@ -34,10 +34,13 @@ def check_distance(dof: NamedDof, distance: float) -> None:
         raise FieldError("distance", distance, f"at most {largest:g} {unit(dof)}, and not 0")
 
 
-def jog(config: DrivesConfig, dof: Motor, distance: float) -> tuple[float, float]:
+def jog(
+    config: DrivesConfig, dof: Motor, distance: float, *, reset_faults: bool = False
+) -> tuple[float, float]:
     """Move a motor along raised cosines by `distance` [m or rad] and back, with `_RESTS`.
 
-    THE MOTOR MOVES. It is quick-stopped at the end, and on every error.
+    THE MOTOR MOVES. It is quick-stopped at the end, and on every error. Faults of the drives are
+    reset first if `reset_faults`: find their cause before.
 
     Returns:
         Largest displacement and displacement at the end, as the drive measured them [m or rad].
@@ -48,7 +51,7 @@ def jog(config: DrivesConfig, dof: Motor, distance: float) -> tuple[float, float
     """
     check_distance(dof, distance)
     with exit_on_signals(), open_drives(config) as drives:
-        begin = drives.start()
+        begin = drives.start(reset_faults=reset_faults)
         commands = [command for _, command in _out_and_back(begin, dof, distance, config.cycle)]
         try:
             applied = [begin, *drives.follow(commands)]
