@@ -148,7 +148,7 @@ def test_messages_are_of_one_frame() -> None:
     ("changes", "field"),
     [
         ({"kinematics.kind": "joints"}, "kinematics.kind"),
-        ({"dof": []}, "measurement.topics[0]"),
+        ({"dof": [], "kinematics": {}}, "measurement.topics"),
         ({"measurement.topics": [{"name": "a b", "type": "PoseStamped"}]}, "topics[0].name"),
         ({"measurement.topics": [{"name": "a", "type": "JointState"}] * 2}, "topics[1].name"),
         ({"measurement.topics": [{"name": "a", "type": "Image"}]}, "topics[0].type"),
