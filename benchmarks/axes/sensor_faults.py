@@ -15,9 +15,12 @@ from faults.recorder import Floats, RunRecorder
 from tautscope import HysteresisReduction, PlayRig, Sample, Tip, axes
 from tautscope.config import Sine
 from tautscope.loop.references import OperatorMotion
+from tautscope.runs.play_rig import EVERY
 
-WIDTH_LIMIT, DELAY, EVERY, DURATION = 1.0, 0.05, 5, 30.0
-NOISE = 0.003
+WIDTH_LIMIT, NOISE = 1.0, 0.003
+"""Of each degree of freedom, and of its sensor [rad]."""
+DELAY, DURATION = 0.05, 30.0
+"""Of the sensor, and of a run [s]."""
 SEEDS = 40
 EARLY, LATE = (0.0, 3.0), (15.0, 22.5)
 """When faults begin [s]: mostly before the first reversal, and later."""
@@ -38,8 +41,8 @@ class Job(NamedTuple):
 class Fault:
     """A fault of the values (n,) of a sensor, drawn by the seed.
 
-    It begins at `start` [s] and ends at `end`, with the even seeds never. It is one of one value,
-    or of all, as drawn.
+    It begins at `start` [s] and ends at `end`, with even seeds never. It hits the first value, or
+    all, as drawn.
     """
 
     def __init__(self, job: Job) -> None:
