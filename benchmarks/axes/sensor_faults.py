@@ -55,6 +55,7 @@ class Fault:
         self._which = [np.array([True, True]), np.array([True, False])][rng.integers(2)]
         self._severity, self.sign = rng.uniform(), float(rng.choice([-1.0, 1.0]))
         self.past: deque[Floats] = deque(maxlen=5 + int(20 * self._severity))
+        self._held = np.zeros(2)
 
     def __call__(self, values: Floats, time: float) -> Floats | None:
         """The values with the fault; None if nothing arrives."""

@@ -11,11 +11,13 @@ from tautscope.hardware.signals import defer_signals, exit_on_signals
 
 @pytest.fixture(autouse=True)
 def handlers() -> Iterator[None]:
-    """Check that the handlers are restored."""
+    """Check that the handlers are restored; SIGHUP is not ignored, as it is below nohup."""
+    ours = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
     yield
     assert [signal.getsignal(number) for number in numbers] == before
+    signal.signal(signal.SIGHUP, ours)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
