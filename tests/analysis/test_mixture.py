@@ -11,9 +11,15 @@ from play_model import play
 from tautscope._core import track_coefficients
 from tautscope.analysis.comparison import HORIZONS, analyze, seen_at
 from tautscope.analysis.models import last_tip, mixture
-from tautscope.analysis.models.components import Component, Refit, Signals
+from tautscope.analysis.models.components import (
+    NOISE,
+    UNKNOWN,
+    Component,
+    Refit,
+    Signals,
+    track,
+)
 from tautscope.analysis.models.task import Task, continued
-from tautscope.analysis.models.tracked_regression import NOISE, UNKNOWN, track
 from tautscope.config import load_config
 from tautscope.errors import SignalError
 from tautscope.report.metrics import rms

@@ -24,7 +24,7 @@ from tautscope.log import topics
 from tautscope.log.alignment import align_recording
 from tautscope.log.export import export_csv, recover
 from tautscope.log.fields import multi_array
-from tautscope.log.header import RunInfo, header_messages, read_header
+from tautscope.log.header import header_messages, read_header
 from tautscope.log.messages import Clock, Codec
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.replay import estimate_from_log, replay_same
@@ -257,7 +257,7 @@ def test_a_measurement_of_another_kind_is_refused(labels: tuple[str, str], count
 
 
 def test_a_log_has_at_most_eight_dofs() -> None:
-    header = header_messages(RunInfo(axes(8, width_limit=1.0), True, ()), 0)
+    header = header_messages(axes(8, width_limit=1.0), True, (), 0)
     text = topics.decode(topics.CONFIG, header[topics.CONFIG]).data
     ninth = '\n[[dof]]\nname = "ninth"\nwidth_limit = 1.0\n'
     header[topics.CONFIG] = topics.encode(topics.CONFIG, {"data": text + ninth})

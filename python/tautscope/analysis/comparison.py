@@ -44,8 +44,6 @@ class Entry:
     """Result of one model.
 
     Attributes:
-        model: The model.
-        prediction: Its prediction.
         rmse: RMS error over the scored samples [tip's unit].
         horizons: Errors with sights at the distances `HORIZONS`.
     """
@@ -61,7 +59,6 @@ class Analysis:
     """Results of all models on a record.
 
     Attributes:
-        record: The record.
         half: First sample of the second half; both halves have equally many measured tips.
         every: Of so many samples one tip is used, see `thinned`.
         entries: One per model, in the order of the registry.

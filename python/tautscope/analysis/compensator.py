@@ -131,12 +131,10 @@ def shared_delays(parts: Parts) -> dict[str, float]:
     sensors, delays = sensors_of(parts)
     if len(delays) < MOST_SENSORS:
         return {}
-    given = dict(zip(parts, [delays[sensor] for sensor in sensors], strict=True))
-    own = dict(zip(parts, _late(parts), strict=True))
     return {
-        name: delay
-        for name, delay in given.items()
-        if abs(delay - own[name]) > 2 * _doubt(*parts[name])
+        name: delays[sensor]
+        for name, sensor, own in zip(parts, sensors, _late(parts), strict=True)
+        if abs(delays[sensor] - own) > 2 * _doubt(*parts[name])
     }
 
 
@@ -203,16 +201,15 @@ def notes(parts: Parts) -> list[str]:
         f"range: motion of the record and {MARGIN:g} slacks more. May your motors go there?",
         f"law.change_rate: for a sensor that is never wrong, else {Config().law.change_rate:g}.",
     ]
-    if any(record.is_timed for record, _ in parts.values()):
-        found.append(
-            f"speed: {HASTE:g} times that of the record; a faster reference is held to it."
-        )
+    untimed = [name for name, (record, _) in parts.items() if not record.is_timed]
+    if len(untimed) < len(parts):
+        what = f"speed: {HASTE:g} times that of the record; a faster reference is held to it."
+        found.append(what)
     for name, (record, _) in parts.items():
         unit, scale = record.units[1], scale_of(record)
         if scale != (LENGTHS.get(unit) or ANGLES.get(unit)):
             what = "the file names no plausible length or angle as the tip's unit"
             found.append(f"{what}: {scale:g} {'rad' if unit in ANGLES else 'm'} is 1 of {name}")
-    untimed = [name for name, (record, _) in parts.items() if not record.is_timed]
     if untimed:
         found.append("The record has no time: set speed, and measurement.delays in s.")
     late = {name: late_by(*part) for name, part in parts.items() if part[0].is_timed}

@@ -57,11 +57,8 @@ class Signals:
         self.longest_delay = max(self.stroke / 2, 1e-9)
         self.where = np.flatnonzero(fit_samples(command[kept], self.measured))
         self.target = self.measured[self.where]
-        x = (
-            np.linspace(-1, 1, len(kept))
-            if duration == 0
-            else (2 * (self.time - time[0]) / duration - 1)
-        )
+        at_once = np.linspace(-1, 1, len(kept))
+        x = 2 * (self.time - time[0]) / duration - 1 if duration else at_once
         fitted = x[self.where]
         x = np.clip(x, fitted[0], fitted[-1])  # a polynomial says nothing outside
         degree = 3 if len(at) >= 12 else 1

@@ -3,11 +3,9 @@
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
 from multiprocessing import get_context
 from typing import Any
 
@@ -19,7 +17,6 @@ from tautscope.errors import RecordError
 from tautscope.runs.columns import time_column
 from tautscope.runs.episodes import Episode, open_episode
 from tautscope.runs.records import read_record
-from tautscope.runs.tables import Sheet
 
 CHUNK = 4
 """Episodes that a worker gets at once."""
@@ -27,38 +24,22 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLAR
 """One each in a worker: the matrices are small, and two workers with all threads are slower."""
 
 
-@dataclass(frozen=True)
-class Request:
-    """What is read from each episode.
-
-    Attributes:
-        folder: Of the data set.
-        pairs: Columns of command and tip of each degree of freedom.
-        names: Of the degrees of freedom.
-        time: Column of the time; None for a column that is called so.
-        missing: Values that stand for none.
-    """
-
-    folder: str
-    pairs: tuple[tuple[str, str], ...]
-    names: tuple[str, ...]
-    time: str | None
-    missing: tuple[float, ...]
+Rows = list[dict[str, Any]]
+"""A row for each degree of freedom of an episode."""
 
 
 def judge_all(
-    episodes: Sequence[Episode], request: Request, workers: int
-) -> Iterator[list[dict[str, Any]]]:
-    """A row for each degree of freedom of each episode, in their order, from worker processes."""
-    read = partial(judge_episode, request)
+    episodes: Sequence[Episode], judge_one: Callable[[Episode], Rows], workers: int
+) -> Iterator[Rows]:
+    """Rows of each episode, in their order, from worker processes."""
     workers = min(workers, -(-len(episodes) // CHUNK))
     if workers <= 1:
-        yield from map(read, episodes)
+        yield from map(judge_one, episodes)
         return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         try:
             with _one_thread_each():  # the workers start in `map`
-                found = pool.map(read, episodes, chunksize=CHUNK)
+                found = pool.map(judge_one, episodes, chunksize=CHUNK)
             yield from found
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -80,24 +61,29 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def judge_episode(request: Request, episode: Episode) -> list[dict[str, Any]]:
-    """A row for each degree of freedom; what an episode lacks is in its row."""
+def judge_episode(
+    folder: str,
+    pairs: Mapping[str, tuple[str, str]],
+    time: str | None,
+    missing: Sequence[float],
+    episode: Episode,
+) -> Rows:
+    """Judge the columns of command and tip of each degree of freedom of an episode in a folder.
+
+    What an episode lacks is in its row. Without a time it is in the column that is called so.
+    """
     rows, sheet = [], None
-    for name, (command, tip) in zip(request.names, request.pairs, strict=True):
+    for name, (command, tip) in pairs.items():
         row: dict[str, Any] = {"episode": episode.number, "name": name}
         try:
-            sheet = sheet or open_episode(request.folder, episode)
-            row |= _row(_verdict(sheet, command, tip, request))
+            sheet = sheet or open_episode(folder, episode)
+            at = time or time_column(sheet.titles)
+            record = read_record(sheet, command, tip, at, missing=missing)
+            row |= _row(judge(record, columns=(command, tip)))
         except RecordError as error:
             row |= {"identified": False, "aligned": False, "missing": str(error)}
         rows.append(row)
     return rows
-
-
-def _verdict(sheet: Sheet, command: str, tip: str, request: Request) -> Verdict:
-    time = request.time or time_column(sheet.titles)
-    record = read_record(sheet, command, tip, time, missing=request.missing)
-    return judge(record, columns=(command, tip))
 
 
 def _row(verdict: Verdict) -> dict[str, Any]:

@@ -50,16 +50,14 @@ class Finding:
     rows: tuple[tuple[int, int], ...] = ()
 
     def __str__(self) -> str:
-        return f"{self.signal}: {self.what}{self._place()}"
-
-    def _place(self) -> str:
+        text = f"{self.signal}: {self.what}"
         if not self.rows:
-            return ""
+            return text
         shown = [f"{a}" if a == b else f"{a} to {b}" for a, b in self.rows[:3]]
         others = len(self.rows) - 3
         more = f" and {others} more place{'s' if others > 1 else ''}" if others > 0 else ""
         is_one = len(self.rows) == 1 and self.rows[0][0] == self.rows[0][1]
-        return f" (line{'' if is_one else 's'} {', '.join(shown)}{more})"
+        return f"{text} (line{'' if is_one else 's'} {', '.join(shown)}{more})"
 
 
 def without_errors(record: Record) -> tuple[Record, list[Finding]]:
@@ -69,15 +67,15 @@ def without_errors(record: Record) -> tuple[Record, list[Finding]]:
     if len(moved) and moved[0] > len(record.command) / 2:
         first = int(moved[0]) - 1
         what = f"{first} samples of rest before the motion, left out"
-        lines = int(record.rows[0]), int(record.rows[first - 1])
-        findings.append(Finding("command", what, (lines,)))
+        findings.append(Finding("command", what, _lines(record, [(0, first - 1)])))
         record = record.part(slice(first, None))
     signals = {"command": record.command, "tip": record.measured}
     for name, values in signals.items():
         unwrapped, period, at = _unwrapped(values)
         if len(at):
             what = f"wraps at a range of {period:.6g}; it was unwrapped"
-            findings.append(Finding(name, what, _places(record, _mask(at, len(values)))))
+            places = _runs(_mask(at, len(values)))
+            findings.append(Finding(name, what, _lines(record, places)))
         is_far = _far(unwrapped)
         for is_wrong, what in (
             (is_far, "values far from all others, as those that mark missing ones"),
@@ -86,7 +84,7 @@ def without_errors(record: Record) -> tuple[Record, list[Finding]]:
             if is_wrong.any():
                 worst = unwrapped[is_wrong][np.argmax(np.abs(unwrapped[is_wrong]))]
                 text = f"{is_wrong.sum()} {what}, such as {worst:.6g}, left out"
-                findings.append(Finding(name, text, _places(record, is_wrong)))
+                findings.append(Finding(name, text, _lines(record, _runs(is_wrong))))
                 unwrapped = np.where(is_wrong, np.nan, unwrapped)
         signals[name] = unwrapped
     command, clock = signals["command"], record.clock
@@ -139,12 +137,9 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
     if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * held:
         return record, found, []
     findings, kept = [], measured.copy()
+    beyond = [near[end] for end in passed if end in near]
     for name, places, others in (
-        (
-            "it stays at its least or largest value while the command moves on",
-            at_end,
-            [near[end] for end in passed if end in near],
-        ),
+        ("it stays at its least or largest value while the command moves on", at_end, beyond),
         ("it repeats its last value while the command moves", repeated, []),
     ):
         if places:
@@ -155,7 +150,7 @@ def identify_without_repeats(record: Record) -> tuple[Record, Identification, li
                 kept[is_near] = np.nan
             count = before - np.count_nonzero(np.isfinite(kept))
             longest = sorted(places, key=lambda run: run[0] - run[1])
-            rows = tuple((int(record.rows[a]), int(record.rows[b])) for a, b in longest)
+            rows = _lines(record, longest)
             findings.append(Finding("tip", f"{name}; {count} samples left out", rows))
     return replace(record, measured=kept), identify(time, record.command, kept), findings
 
@@ -185,10 +180,8 @@ def curve_finding(record: Record, found: Identification) -> Finding | None:
     extent = float(np.ptp(path))
     powers = np.polynomial.legendre.legvander(2 * (path - path.min()) / extent - 1, 3)
     curve = powers @ np.linalg.lstsq(powers, error, rcond=None)[0]
-    if float(np.std(error - curve)) > CURVED * float(np.std(error)):
-        return None
     off = float(np.max(np.abs(curve)))
-    if off < 0.02 * extent:
+    if float(np.std(error - curve)) > CURVED * float(np.std(error)) or off < 0.02 * extent:
         return None
     return Finding("tip", f"{CURVE}, up to {off:.3g} off a line")
 
@@ -230,9 +223,7 @@ def _unwrapped(values: Floats) -> tuple[Floats, float, NDArray[np.intp]]:
     extent = float(np.ptp(values[seen]))
     for period in WRAPS:
         is_wrap = sizes > period / 2
-        if not is_wrap.any() or extent > period * (1 + 1e-6):
-            continue
-        if np.count_nonzero(is_wrap) > len(sizes) / 4:
+        if extent > period * (1 + 1e-6) or not 0 < np.count_nonzero(is_wrap) <= len(sizes) / 4:
             continue
         largest = float(np.max(sizes[~is_wrap], initial=0.0))
         if np.min(sizes[is_wrap]) - largest < period / 4:
@@ -287,5 +278,5 @@ def _runs(mask: Mask) -> list[tuple[int, int]]:
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _places(record: Record, mask: Mask) -> tuple[tuple[int, int], ...]:
-    return tuple((int(record.rows[a]), int(record.rows[b])) for a, b in _runs(mask))
+def _lines(record: Record, runs: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    return tuple((int(record.rows[a]), int(record.rows[b])) for a, b in runs)

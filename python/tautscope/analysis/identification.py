@@ -258,16 +258,18 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     weights = signals.solve(found)[0]
     width, delay = _jackknife(signals, found)
     is_at_limit = x[0] > 0.98 * _LARGEST or abs(x[2]) > 0.98
-    predicted, offset, drift = _extended(time, signals, found, weights)
+    drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
+    # The polynomials have no mean over the samples of the fit, which may lie otherwise in time.
+    mean = float(drift.mean())
     return Identification(
         width=width,
         delay=delay,
         gain=float(weights[0]),
-        offset=offset,
+        offset=float(weights[1]) + mean,
         radius=found.radius,
         rounding=found.rounding,
-        drift=drift,
-        predicted=predicted,
+        drift=drift - mean,
+        predicted=weights[0] * signals.output(found, time) + weights[1] + drift,
         noise=error,
         explanations={name: error for name, (_, error) in fits.items()},
         strokes=len(_stroke_ends(signals, found)) + 1,
@@ -275,18 +277,6 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
         is_at_limit=bool(is_at_limit),
         stroke=signals.stroke,
     )
-
-
-def _extended(
-    time: Floats, signals: Signals, shape: Shape, weights: Floats
-) -> tuple[Floats, float, Floats]:
-    """Output of the model, its offset, and the drift, at every sample of the record."""
-    drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
-    output = signals.output(shape, time)
-    # The polynomials have no mean over the samples of the fit, which may lie otherwise in time.
-    mean = float(drift.mean())
-    predicted = weights[0] * output + weights[1] + drift
-    return predicted, float(weights[1]) + mean, drift - mean
 
 
 def _grid(signals: Signals) -> list[Shape]:

@@ -1,8 +1,7 @@
-"""The files of an analysis: compensator, verdict and models as figures, samples as CSV."""
+"""The files of an analysis: compensator, samples as CSV, and figures."""
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,18 +38,14 @@ def write_results(
         for verdict, analysis in results:
             own = place if len(results) == 1 else place / verdict.name
             own.mkdir(exist_ok=True)
-            _write_one(verdict, analysis, own)
+            columns = {name: _rounded(values) for name, values in _columns(analysis).items()}
+            table = pl.DataFrame(columns).fill_nan(None)
+            table.write_csv(own / "analysis.csv", null_value="nan")
+            with style():
+                slide(verdict).savefig(own / "analyze.png")
+                analysis_figure(analysis).savefig(own / "models.png")
         parts = parts_of(verdict for verdict, _ in results)
         return write_compensator(parts, place) if parts else None
-
-
-def _write_one(verdict: Verdict, analysis: Analysis, place: Path) -> None:
-    columns = _columns(analysis)
-    table = pl.DataFrame({name: _rounded(values) for name, values in columns.items()})
-    table.fill_nan(None).write_csv(place / "analysis.csv", null_value="nan")
-    with style():
-        slide(verdict).savefig(place / "analyze.png")
-        analysis_figure(analysis).savefig(place / "models.png")
 
 
 def _rounded(values: Floats | NDArray[np.int64]) -> Floats | NDArray[np.int64]:
@@ -122,11 +117,11 @@ def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
     at = np.arange(len(record.rows)) if record.time is None else record.time
     measured = np.isfinite(record.measured)
     errors = [entry.prediction.tip - record.measured for entry in analysis.entries]
-    limits = [1.1 * float(np.quantile(np.abs(error[analysis.scored]), 0.99)) for error in errors]
+    scored = analysis.scored
+    limits = [1.1 * float(np.quantile(np.abs(error[scored]), 0.99)) for error in errors]
     is_linear = [entry.model is LINEAR_FIT for entry in analysis.entries]
-    common = max(
-        (limit for limit, own in zip(limits, is_linear, strict=True) if not own), default=0.0
-    )
+    others = [limit for limit, own in zip(limits, is_linear, strict=True) if not own]
+    common = max(others, default=0.0)
     count = len(analysis.entries)
     axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
     for row, entry in enumerate(analysis.entries):
@@ -142,12 +137,9 @@ def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
         limit = limits[row] if is_linear[row] else common
         if limit > 0:
             strip.set_ylim(-limit, limit)
-        command = record.command[analysis.scored]
-        for values, colour, width in (
-            (record.measured, GREY, 1.6),
-            (entry.prediction.tip, BLUE, 0.7),
-        ):
-            loop.plot(command, values[analysis.scored], color=colour, linewidth=width)
+        command = record.command[scored]
+        loop.plot(command, record.measured[scored], color=GREY, linewidth=1.6)
+        loop.plot(command, entry.prediction.tip[scored], color=BLUE, linewidth=0.7)
         loop.set_ylabel("tip")
         loop.locator_params(axis="x", nbins=3)
     axes[0, 0].set_xlim(at[0], at[-1])
@@ -156,3 +148,28 @@ def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
     axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
     axes[0, 1].set_title("measured", color=GREY, loc="left")
     axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")
+
+
+def episodes_figure(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> Figure:
+    """Width with its interval in each episode, one panel per degree of freedom."""
+    with style():
+        figure = Figure(figsize=(PAGE, 0.6 + 1.6 * len(names)), layout="constrained")
+        panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, name in zip(panels, names, strict=True):
+            own = [row for row in rows if row["name"] == name]
+            known = [row for row in own if row["identified"]]
+            at, width, low, high = (
+                np.array([row[key] for row in known], np.float64)
+                for key in ("episode", "width", "width_low", "width_high")
+            )
+            axes.vlines(at, low, high, color=BLUE, linewidth=0.8, alpha=0.5)
+            axes.plot(at, width, "o", color=BLUE, markersize=2.5)
+            if known:
+                axes.axhline(float(np.median(width)), color=GREY, linewidth=0.8, zorder=0)
+            axes.margins(y=0.15)
+            axes.set_ylim(bottom=0)
+            axes.set_ylabel("slack")
+            median = f", median {np.median(width):.3g}" if known else ""
+            axes.set_title(f"{name}: identified in {len(known)} of {len(own)} episodes{median}")
+        panels[-1].set_xlabel("episode")
+    return figure

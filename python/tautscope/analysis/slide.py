@@ -24,7 +24,7 @@ _FONTS = {
     "legend.fontsize": 11,
 }
 _STROKES, _POINTS = 6, 3000
-"""That are drawn."""
+"""That are drawn: the last strokes of the command."""
 
 
 def slide(verdict: Verdict) -> Figure:
@@ -33,7 +33,9 @@ def slide(verdict: Verdict) -> Figure:
     The loop is drawn over the reference: the command in the tip's unit, as late as the tip, without
     drift. The tip with the loop is that of the simulation.
     """
-    shown = _last_strokes(verdict)
+    command = verdict.record.command
+    at = turns(command, 0.2 * float(np.ptp(command)))
+    shown = slice(int(at[-_STROKES - 1]) if len(at) > _STROKES else 0, len(command))
     with style(), matplotlib.rc_context(_FONTS):  # type: ignore[arg-type]  # its stub lists all
         figure = Figure(figsize=SIZE, layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.15, 1))
@@ -53,14 +55,6 @@ def _headline(verdict: Verdict) -> str:
     if found.is_aligned:
         return f"{verdict.name}: no slack"
     return f"{verdict.name}: slack not identified: {found.missing}"
-
-
-def _last_strokes(verdict: Verdict) -> slice:
-    """The samples of the last strokes of the command."""
-    command = verdict.record.command
-    at = turns(command, 0.2 * float(np.ptp(command)))
-    begin = int(at[-_STROKES - 1]) if len(at) > _STROKES else 0
-    return slice(begin, len(command))
 
 
 def _draw_loop(axes: Axes, verdict: Verdict, shown: slice) -> None:

@@ -110,7 +110,7 @@ class Verdict:
             "interval": [found.width.low, found.width.high] if is_known else None,
             "delay": found.delay.value if is_known else None,
             "delay_interval": [found.delay.low, found.delay.high] if is_known else None,
-            "delay_unit": self._clock,
+            "delay_unit": self.record.clock_unit,
             "gain": found.gain if is_known else None,
             "drift": float(np.ptp(found.drift)) if is_known else None,
             "noise": found.noise if is_known else None,
@@ -126,10 +126,6 @@ class Verdict:
         }
 
     @property
-    def _clock(self) -> str:
-        return "s" if self.record.is_timed else "samples"
-
-    @property
     def _is_late(self) -> bool:
         return late_by(self.record, self.found) != 0.0
 
@@ -143,7 +139,7 @@ class Verdict:
         return f"{plus_minus(self.found.width)} {self.record.units[1]}".rstrip()
 
     def _delay(self) -> str:
-        return f"{plus_minus(self.found.delay)} {self._clock}"
+        return f"{plus_minus(self.found.delay)} {self.record.clock_unit}"
 
     def _relation(self) -> str:
         gain = f"The tip follows the command with a gain of {self.found.gain:.3g}"
@@ -167,7 +163,8 @@ class Verdict:
             return self._use()
         if found.is_aligned:
             if self._is_late:
-                return f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
+                late = f"{found.delay.value:.3g} {self.record.clock_unit}"
+                return f"subtract {late} from the tip's time stamps"
             return "command the motor directly; the error that remains is not slack"
         if found.is_related and any(CURVE in each.what for each in self.findings):
             return (
@@ -208,10 +205,9 @@ def judge(
     record, found, repeated = identify_without_repeats(record)
     findings += repeated
     if held := held_for(record):
-        unit = "s" if record.is_timed else "samples"
         what = (
-            f"it is setpoints, each held for {held:.2g} {unit}, which the motor follows in its own "
-            "way: record the motor's own position"
+            f"it is setpoints, each held for {held:.2g} {record.clock_unit}, which the motor "
+            "follows in its own way: record the motor's own position"
         )
         findings.append(Finding("command", what))
     if found.is_identified or found.is_aligned:
@@ -222,23 +218,15 @@ def judge(
         more = gain_finding(record, found.gain), curve_finding(record, found)
         findings += [each for each in more if each is not None]
         if found.is_early:
-            unit = "s" if record.is_timed else "samples"
             what = (
-                f"it moves {-found.delay.value:.3g} {unit} before its command: are --command and "
-                "--measured swapped, or the motor's time stamps late?"
+                f"it moves {-found.delay.value:.3g} {record.clock_unit} before its command: are "
+                "--command and --measured swapped, or the motor's time stamps late?"
             )
             findings.append(Finding("tip", what))
-    is_used = found.is_identified
-    parts = {name: (record, found)}
-    return Verdict(
-        name,
-        columns,
-        record,
-        found,
-        tuple(findings),
-        simulate(parts, name) if is_used else None,
-        compensator(parts) if is_used else None,
-    )
+    parts = {name: (record, found)} if found.is_identified else {}
+    effect = simulate(parts, name) if parts else None
+    settings = compensator(parts) if parts else None
+    return Verdict(name, columns, record, found, tuple(findings), effect, settings)
 
 
 def parts_of(verdicts: Iterable[Verdict]) -> Parts:
@@ -253,19 +241,19 @@ def together(verdicts: Sequence[Verdict]) -> list[Verdict]:
         return list(verdicts)
     shared = shared_delays(parts)
 
-    def one(verdict: Verdict) -> Verdict:
-        if verdict.name not in parts:
-            return verdict
-        findings = verdict.findings
-        if verdict.name in shared:
+    found = []
+    for each in verdicts:
+        findings, effect = each.findings, each.compensation
+        if each.name in shared:
             what = (
-                f"compensator.toml has a delay of {shared[verdict.name]:.3g} s for it, since the "
+                f"compensator.toml has a delay of {shared[each.name]:.3g} s for it, since the "
                 f"loop has at most {MOST_SENSORS} sensors: analyze fewer columns at once"
             )
             findings += (Finding("tip", what),)
-        return replace(verdict, findings=findings, compensation=simulate(parts, verdict.name))
-
-    return [one(verdict) for verdict in verdicts]
+        if each.name in parts:
+            effect = simulate(parts, each.name)
+        found.append(replace(each, findings=findings, compensation=effect))
+    return found
 
 
 def plus_minus(interval: Interval) -> str:

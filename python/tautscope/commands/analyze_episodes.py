@@ -4,6 +4,7 @@ import argparse
 import os
 import shlex
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from tautscope.commands import arguments
@@ -34,22 +35,19 @@ def analyze_episodes(
     """Judge all episodes; write episodes.csv and episodes.png, and print what they say."""
     import polars as pl  # noqa: PLC0415
 
-    from tautscope.analysis.episodes import (  # noqa: PLC0415
-        Request,
-        judge_all,
-        summarize,
-    )
-    from tautscope.analysis.episodes_figure import episodes_figure  # noqa: PLC0415
+    from tautscope.analysis.episodes import judge_all, judge_episode, summarize  # noqa: PLC0415
+    from tautscope.analysis.output import episodes_figure  # noqa: PLC0415
 
     of_one = ("tip_file", "update_distance", "gain", "check", "config")
     arguments.refuse_unused(options, "--episode, of a data set", *of_one)
     folder = arguments.out_folder(options)
     pairs = tuple(zip(options.command, options.measured, strict=True))
-    request = Request(options.file, pairs, tuple(names), options.time, tuple(options.missing))
+    by_name = dict(zip(names, pairs, strict=True))
+    judge_one = partial(judge_episode, options.file, by_name, options.time, options.missing)
     workers = options.workers or os.cpu_count() or 1
     rows: list[dict[str, Any]] = []
     with progress_bar("episodes") as progress:
-        for done, each in enumerate(judge_all(episodes, request, workers), 1):
+        for done, each in enumerate(judge_all(episodes, judge_one, workers), 1):
             rows += each
             progress(done / len(episodes))
     with new_folder(folder) as place:

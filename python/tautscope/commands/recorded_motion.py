@@ -83,12 +83,11 @@ def _read_log(
     config = log.config if options.config is None else arguments.article_config(options.config)
     config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
     recorder = make(config)
-    captured = log.update_names.index("captured_at")
     for index, event in log.events.items():
         if isinstance(event, Tick):
             recorder.add_tick(event.sample.time, event.sample.applied)
         elif isinstance(event, Update) and log.has_image(index):
-            captured_at = float(event.row[captured])  # type: ignore[arg-type]
+            captured_at = float(event.row["captured_at"])
             if recorder.is_due(captured_at):
                 recorder.add_image(log.image(index), captured_at)
     return recorder, config

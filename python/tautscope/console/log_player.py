@@ -5,7 +5,6 @@ import time
 from bisect import bisect_left
 from collections.abc import Callable
 from os import PathLike
-from typing import Any
 
 import numpy as np
 
@@ -167,8 +166,7 @@ class LogPlayer:
             state.show_truth(tick.sample.true_state, self._kinematics)
 
     def _add_update(self, index: int, update: Update) -> None:
-        row: dict[str, Any] = dict(zip(self._log.update_names, update.row, strict=True))
-        state, dofs = self._state, self._log.config.dofs
+        row, state, dofs = update.row, self._state, self._log.config.dofs
         estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
         predicted = np.array([row[f"predicted_{dof.label}"] for dof in dofs], np.float64)
         if self._log.config.profile == "paper":  # as in `session_state`
@@ -178,8 +176,8 @@ class LogPlayer:
         state.tip = known(tip)
         state.delta_minus, state.delta_plus = values(update.delta_minus), values(update.delta_plus)
         self._images += 1
-        age = row["arrived_at"] - row["captured_at"]
-        state.image = ImageState(self._images, row["status"], age, updates=self._images)
+        age = float(row["arrived_at"] - row["captured_at"])
+        state.image = ImageState(self._images, str(row["status"]), age, updates=self._images)
         state.image.deviation = (None,) * len(dofs)
         if self._log.has_image(index):
             a, b = (math.isfinite(row[f"features_{band}_x"]) for band in "ab")

@@ -35,20 +35,16 @@ def estimation_quality(
 
 
 def _quality(run: Recording, other: Recording | None, name: str) -> dict[str, float]:
-    frames = run.frames
-    seen = frames[f"observable_{name}"]
-    error = (frames[f"estimate_{name}"] - frames[f"true_{name}"])[seen]
+    estimate, observable = f"estimate_{name}", f"observable_{name}"
+    frames, seen = run.frames, run.frames[observable]
+    error = (frames[estimate] - frames[f"true_{name}"])[seen]
     change = np.empty(0)
     if other is not None:
         _, mine, theirs = np.intersect1d(
             frames["sequence"], other.frames["sequence"], return_indices=True
         )
-        both = seen[mine] & other.frames[f"observable_{name}"][theirs]
-        values = [
-            table[f"estimate_{name}"][rows][both]
-            for table, rows in ((frames, mine), (other.frames, theirs))
-        ]
-        change = values[0] - values[1]
+        both = seen[mine] & other.frames[observable][theirs]
+        change = (frames[estimate][mine] - other.frames[estimate][theirs])[both]
     width = float(_width(run.trace[-1:], name)[0]) if len(run.trace) else np.nan
     # No travel shows slack wider than itself; 0 is the estimate before any.
     is_known = (

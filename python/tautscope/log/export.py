@@ -50,7 +50,7 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
     with new_file(target) as partial, partial.open("wb") as file:
         copy = McapFile(file)
         for _, topic, message in read_messages(source, damage):
-            if topic not in copy:
+            if topic not in topics.TYPES:
                 skipped[topic] += 1
                 continue
             at = message.log_time
@@ -97,11 +97,10 @@ def export_rosbag(path: str | PathLike[str], folder: str | PathLike[str]) -> Rec
 
 def _metadata(recovery: Recovery, name: str) -> str:
     """As JSON, which is YAML."""
-    count = sum(recovery.messages.values())
     timing = {
         "duration": {"nanoseconds": recovery.last - recovery.first},
         "starting_time": {"nanoseconds_since_epoch": recovery.first},
-        "message_count": count,
+        "message_count": sum(recovery.messages.values()),
     }
     topics_with_count = [
         {

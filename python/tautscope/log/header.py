@@ -3,8 +3,7 @@
 import json
 import platform
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 
 import tomlkit
 
@@ -18,21 +17,13 @@ from tautscope.loop.references import Segment
 from tautscope.runs.recording import read_run_facts, run_facts
 
 
-@dataclass(frozen=True, slots=True)
-class RunInfo:
-    """The data of a run that are known before it starts."""
-
-    config: Config
-    compensated: bool
-    segments: tuple[Segment, ...]
-
-
-def header_messages(info: RunInfo, stamp: int) -> dict[str, bytes]:
+def header_messages(
+    config: Config, compensated: bool, segments: Iterable[Segment], stamp: int
+) -> dict[str, bytes]:
     """The messages at the start of a log: configuration, run, versions, and a camera if used."""
-    config = info.config
     messages = {
         topics.CONFIG: {"data": dump_config(config)},
-        topics.RUN: {"data": tomlkit.dumps(run_facts(info.compensated, info.segments))},
+        topics.RUN: {"data": tomlkit.dumps(run_facts(compensated, segments))},
         topics.VERSIONS: {"data": json.dumps(software_versions())},
     }
     if not config.dof:
@@ -50,8 +41,10 @@ def software_versions() -> dict[str, str]:
     }
 
 
-def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:
-    """Read run data and versions from the messages of `header_messages`.
+def read_header(
+    messages: Mapping[str, bytes],
+) -> tuple[Config, bool, tuple[Segment, ...], dict[str, str]]:
+    """Read configuration, compensation, segments and versions of `header_messages`.
 
     Raises:
         RecordError: A message is missing or invalid.
@@ -65,10 +58,9 @@ def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]
     try:
         texts = {topic: topics.decode(topic, messages[topic]).data for topic in needed}
         config = from_document(tomllib.loads(texts[topics.CONFIG]))
-        compensated, segments = read_run_facts(texts[topics.RUN], config)
-        versions = json.loads(texts[topics.VERSIONS])
+        facts = read_run_facts(texts[topics.RUN], config)
+        return config, *facts, json.loads(texts[topics.VERSIONS])
     except ConfigError:
         raise
     except (KeyError, TypeError, ValueError) as error:
         raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None
-    return RunInfo(config, compensated, segments), versions

@@ -3,24 +3,25 @@
 import os
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from tautscope.config import Config
 from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
 from tautscope.errors import OutputError
 from tautscope.log import messages as msg
 from tautscope.log import topics
-from tautscope.log.header import RunInfo, header_messages
+from tautscope.log.header import header_messages
 from tautscope.log.images import ImageCodec
 from tautscope.log.mcap_file import McapFile
-from tautscope.loop.rig import Sample
+from tautscope.loop.references import Segment
 
 POLL_PERIOD = 0.01
 """Polling period of the threads [s], far below the `flush_period`."""
@@ -34,52 +35,55 @@ class Journal:
 
     Args:
         path: New file.
-        info: Data of the run; its configuration has the recording settings.
+        config: Configuration of the run; section `recording` has the recording settings.
+        compensated: Whether the loop compensates.
+        segments: Which DOF moves when.
         on_warning: Called by a thread, once per kind of problem.
 
     Attributes:
-        events: Index, time [s] and the arguments of `Codec.tick`, `Codec.update` or
-            `request_messages`.
-        images: Index, time [s], capture time [s], pixels, format.
+        events: Index, wall clock time [ns], and what makes the messages.
+        images: Index, wall clock times of arrival and capture [ns], pixels, format.
         warnings: Their texts.
-        clock: Set at the loop's first call.
         dropped: Number of dropped ticks, updates and requests.
         dropped_images: Number of dropped images.
         failure: Why recording stopped; empty while it works.
         written: Topic -> number of messages.
+        done: Set when writing has ended.
 
     Raises:
         OutputError: The file exists already, or cannot be created or written.
     """
 
-    def __init__(self, path: Path, info: RunInfo, on_warning: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        config: Config,
+        compensated: bool,
+        segments: Iterable[Segment],
+        on_warning: Callable[[str], None],
+    ) -> None:
         self.path = path
-        self.events: deque[tuple[int, float, tuple[Any, ...]]] = deque()
-        self.images: deque[tuple[int, float, float, NDArray[np.uint8], ImageFormat]] = deque()
+        self.events: deque[tuple[int, int, Callable[[], msg.Messages]]] = deque()
+        self.images: deque[tuple[int, int, int, NDArray[np.uint8], ImageFormat]] = deque()
         self.warnings: deque[str] = deque()
-        self._encoded_images: deque[tuple[int, float, float, bytes, str]] = deque()
-        self.clock: msg.Clock | None = None
+        self._encoded_images: deque[tuple[int, int, bytes]] = deque()
         self.dropped = self.dropped_images = 0
         self.failure = ""
         self._on_warning = on_warning
-        self._settings = info.config.recording
-        self._messages = msg.Codec(info.config)
+        self._settings = config.recording
         self._codecs: dict[ImageFormat, ImageCodec] = {
-            kind: ImageCodec(info.config.camera, replace(self._settings, image_format=kind))
+            kind: ImageCodec(config.camera, replace(self._settings, image_format=kind))
             for kind in IMAGE_FORMATS
         }
-        self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
+        self._is_closing, self._is_encoded, self.done = Event(), Event(), Event()
         self._file = _open(path)
-        self._log = _begin(path, self._file, info)
+        stamp = time.time_ns()
+        header = header_messages(config, compensated, segments, stamp)
+        self._log = _begin(path, self._file, header, stamp)
         self.written: Counter[str] = self._log.counts
         self._thread = Thread(target=self._run_writer, name="recording", daemon=True)
         self._thread.start()
         Thread(target=self._run_encoder, name="image encoding", daemon=True).start()
-
-    @property
-    def is_done(self) -> bool:
-        """Whether writing has ended."""
-        return self._is_done.is_set()
 
     def close(self, timeout: float) -> None:
         """Wait until the queues are written, at most `timeout` [s]. May be called twice."""
@@ -99,7 +103,7 @@ class Journal:
             with suppress(OSError):
                 self._file.close()
         finally:
-            self._is_done.set()
+            self.done.set()
         if self.failure:
             images = len(self.images) + len(self._encoded_images)
             waiting = len(self.events) + images
@@ -111,14 +115,13 @@ class Journal:
             )
 
     def _write_log(self) -> None:
-        file = self._log
         flushed = synced = time.monotonic()
         has_warned = False
         while True:
             # Read before the queues are emptied: what is queued later is written in the next pass.
             is_last = self._is_closing.is_set() and self._is_encoded.is_set()
-            self._write_events(file)
-            self._write_images(file)
+            self._write_events()
+            self._write_images()
             if (self.dropped or self.dropped_images) and not has_warned:
                 has_warned = True
                 self._warn("the disk or the encoder is too slow; ticks or images are dropped")
@@ -126,7 +129,7 @@ class Journal:
                 break
             now = time.monotonic()
             if now - flushed >= self._settings.flush_period:
-                file.flush()
+                self._log.flush()
                 flushed = now
             if now - synced >= self._settings.sync_period:
                 self._sync()
@@ -137,8 +140,8 @@ class Journal:
                 f"{self.dropped} ticks, updates, events and {self.dropped_images} images were "
                 "dropped"
             )
-            self._write_events(file)
-        file.finish()
+            self._write_events()
+        self._log.finish()
         self._sync()
 
     def _sync(self) -> None:
@@ -151,51 +154,40 @@ class Journal:
         self._on_warning(f"{self.path}: {text}")
         self.warnings.append(text)
 
-    def _write_events(self, file: McapFile) -> None:
+    def _write_events(self) -> None:
         """Write everything but the images."""
         while self.warnings:
             stamp = time.time_ns()
             message = msg.warning_message(stamp, self.warnings.popleft())
-            file.add(topics.WARNING, message, 0, stamp)
+            self._log.add(topics.WARNING, message, 0, stamp)
         while self.events:
-            index, now, arguments = self.events.popleft()
-            clock = self.clock
-            assert clock is not None
-            for topic, data in self._encoded(clock, arguments).items():
-                file.add(topic, data, index, clock.nanoseconds(now))
+            index, at, encode = self.events.popleft()
+            for topic, data in encode().items():
+                self._log.add(topic, data, index, at)
 
-    def _encoded(self, clock: msg.Clock, arguments: tuple[Any, ...]) -> msg.Messages:
-        if isinstance(arguments[0], str):
-            return msg.request_messages(*arguments)
-        is_tick = isinstance(arguments[0], Sample)
-        return (self._messages.tick if is_tick else self._messages.update)(clock, *arguments)
-
-    def _write_images(self, file: McapFile) -> None:
+    def _write_images(self) -> None:
         """Write the images, and after each one the events, which are quicker to write."""
         while self._encoded_images:
-            index, now, captured_at, data, name = self._encoded_images.popleft()
-            clock = self.clock
-            assert clock is not None
-            message = msg.image_message(clock, captured_at, name, data)
-            file.add(topics.IMAGE, message, index, clock.nanoseconds(now))
-            self._write_events(file)
+            index, at, message = self._encoded_images.popleft()
+            self._log.add(topics.IMAGE, message, index, at)
+            self._write_events()
 
     def _run_encoder(self) -> None:
         """Run the thread that encodes images, so that ticks do not wait for the encoder."""
         limit = self._settings.queue_images
         has_warned = False
-        while not self._is_done.is_set():
+        while not self.done.is_set():
             is_last = self._is_closing.is_set()  # before the queue, as in the other thread
             if not self.images or len(self._encoded_images) >= limit:
                 if is_last and not self.images:
                     break
                 time.sleep(POLL_PERIOD)
                 continue
-            index, now, captured_at, image, kind = self.images[0]
+            index, at, captured_at, image, kind = self.images[0]
             codec = self._codecs[kind]
             try:
-                data = codec.encode(image)
-                self._encoded_images.append((index, now, captured_at, data, codec.format))
+                message = msg.image_message(captured_at, codec.format, codec.encode(image))
+                self._encoded_images.append((index, at, message))
             except Exception as error:  # an invalid image is dropped; the recording goes on
                 self.dropped_images += 1
                 if not has_warned:
@@ -215,12 +207,11 @@ def _open(path: Path) -> IO[bytes]:
         raise OutputError("log", str(path), f"a place that can be written ({error})") from None
 
 
-def _begin(path: Path, file: IO[bytes], info: RunInfo) -> McapFile:
+def _begin(path: Path, file: IO[bytes], messages: Mapping[str, bytes], stamp: int) -> McapFile:
     """Write the header; the file is removed if it cannot be written."""
-    stamp = time.time_ns()
     try:
         log = McapFile(file)
-        for topic, data in header_messages(info, stamp).items():
+        for topic, data in messages.items():
             log.add(topic, data, 0, stamp)
         log.flush()
     except OSError as error:

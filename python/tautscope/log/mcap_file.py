@@ -6,25 +6,13 @@ images takes six times as long as level 1 and gives larger files (decision 0020)
 
 import zlib
 from collections import Counter
+from collections.abc import Sequence
 from typing import IO
 
 import zstandard
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Message,
-    MessageIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 from mcap.writer import MCAP0_MAGIC
 
 from tautscope._core import __version__
@@ -51,11 +39,11 @@ class McapFile:
         self.counts: Counter[str] = Counter()
         self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
         self._schemas = {
-            kind: Schema(id=number, name=kind, encoding="ros2msg", data=schema(kind))
+            kind: records.Schema(id=number, name=kind, encoding="ros2msg", data=schema(kind))
             for number, kind in enumerate(sorted(set(topics.TYPES.values())), 1)
         }
         self._channels = {
-            topic: Channel(
+            topic: records.Channel(
                 id=number,
                 topic=topic,
                 message_encoding="cdr",
@@ -64,14 +52,11 @@ class McapFile:
             )
             for number, (topic, kind) in enumerate(topics.TYPES.items(), 1)
         }
-        self._chunks: list[ChunkIndex] = []
-        self._body, self._indices = RecordBuilder(), dict[int, MessageIndex]()
-        self._put(MCAP0_MAGIC + _bytes(Header("ros2", f"tautscope {__version__}")))
+        self._chunks: list[records.ChunkIndex] = []
+        self._body, self._indices = RecordBuilder(), dict[int, records.MessageIndex]()
+        self._put(MCAP0_MAGIC + _bytes(records.Header("ros2", f"tautscope {__version__}")))
         for record in (*self._schemas.values(), *self._channels.values()):
             record.write(self._body)
-
-    def __contains__(self, topic: str) -> bool:
-        return topic in self._channels
 
     def add(self, topic: str, data: bytes, sequence: int, at: int, sent: int | None = None) -> None:
         """Add a message.
@@ -84,9 +69,9 @@ class McapFile:
             sent: Publish time [ns since 1970]; by default the log time.
         """
         channel = self._channels[topic].id
-        index = self._indices.setdefault(channel, MessageIndex(channel, []))
+        index = self._indices.setdefault(channel, records.MessageIndex(channel, []))
         index.records.append((at, self._body.count))
-        message = Message(
+        message = records.Message(
             channel_id=channel,
             log_time=at,
             data=data,
@@ -104,7 +89,7 @@ class McapFile:
             return
         data = _ended(self._body)
         times = [at for index in self._indices.values() for at, _ in index.records]
-        chunk = Chunk(
+        chunk = records.Chunk(
             compression="zstd",
             data=self._compressor.compress(data),
             message_start_time=min(times),
@@ -118,7 +103,7 @@ class McapFile:
         for channel, index in self._indices.items():
             offsets[channel] = self._at + indices.count
             index.write(indices)
-        entry = ChunkIndex(
+        entry = records.ChunkIndex(
             chunk_length=length,
             chunk_start_offset=start,
             compression="zstd",
@@ -136,43 +121,38 @@ class McapFile:
     def finish(self) -> None:
         """Write the last chunk and the summary section."""
         self.flush()
-        self._put(_bytes(DataEnd(0)))
+        self._put(_bytes(records.DataEnd(0)))
         start, summary, offsets = self._at, RecordBuilder(), RecordBuilder()
-        groups: list[tuple[Opcode, list[McapRecord]]] = [
-            (Opcode.SCHEMA, list(self._schemas.values())),
-            (Opcode.CHANNEL, list(self._channels.values())),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, list(self._chunks)),
-        ]
-        for opcode, records in groups:
-            begin = summary.count
-            for record in records:
-                record.write(summary)
-            if records:
-                SummaryOffset(opcode, start + begin, summary.count - begin).write(offsets)
-        offset_start = start + summary.count
-        body = _ended(summary) + _ended(offsets)
-        footer = Footer(start, offset_start, summary_crc=0)
-        # The checksum covers the summary and the footer except the checksum itself.
-        footer.summary_crc = zlib.crc32(body + _bytes(footer)[:-4])
-        self._put(body + _bytes(footer) + MCAP0_MAGIC)
-
-    def _statistics(self) -> Statistics:
-        starts = [chunk.message_start_time for chunk in self._chunks]
-        ends = [chunk.message_end_time for chunk in self._chunks]
-        return Statistics(
+        counts = {self._channels[topic].id: count for topic, count in self.counts.items()}
+        statistics = records.Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
-            channel_message_counts={
-                self._channels[topic].id: count for topic, count in self.counts.items()
-            },
+            channel_message_counts=counts,
             chunk_count=len(self._chunks),
             message_count=self.counts.total(),
             metadata_count=0,
-            message_start_time=min(starts, default=0),
-            message_end_time=max(ends, default=0),
+            message_start_time=min((each.message_start_time for each in self._chunks), default=0),
+            message_end_time=max((each.message_end_time for each in self._chunks), default=0),
             schema_count=len(self._schemas),
         )
+        groups: list[tuple[Opcode, Sequence[records.McapRecord]]] = [
+            (Opcode.SCHEMA, [*self._schemas.values()]),
+            (Opcode.CHANNEL, [*self._channels.values()]),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+        ]
+        for opcode, group in groups:
+            begin = summary.count
+            for record in group:
+                record.write(summary)
+            if group:
+                records.SummaryOffset(opcode, start + begin, summary.count - begin).write(offsets)
+        offset_start = start + summary.count
+        body = _ended(summary) + _ended(offsets)
+        footer = records.Footer(start, offset_start, summary_crc=0)
+        # The checksum covers the summary and the footer except the checksum itself.
+        footer.summary_crc = zlib.crc32(body + _bytes(footer)[:-4])
+        self._put(body + _bytes(footer) + MCAP0_MAGIC)
 
     def _put(self, data: bytes) -> None:
         rest = memoryview(data)
@@ -181,7 +161,7 @@ class McapFile:
         self._at += len(data)
 
 
-def _bytes(record: McapRecord) -> bytes:
+def _bytes(record: records.McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return _ended(builder)

@@ -48,37 +48,29 @@ class Damage:
         return "; ".join(text for text, is_so in parts.items() if is_so)
 
 
-@dataclass(frozen=True, slots=True)
-class RawRecord:
-    """A record of an MCAP file: byte offset, opcode and content."""
-
-    offset: int
-    opcode: int
-    payload: bytes
-
-    def unpack(self) -> list[McapRecord]:
-        """The schemas, channels and messages of the record; damaged bytes raise any exception."""
-        stream = ReadDataStream(BytesIO(self.payload))
-        if self.opcode == Opcode.CHUNK:
-            chunk = Chunk.read(stream)
-            sizes = [chunk.uncompressed_size]
-            if chunk.compression == "zstd":
-                sizes.append(zstandard.frame_content_size(chunk.data))
-            if max(sizes) > _MAX_CHUNK_SIZE:
-                raise ValueError(f"chunk of {max(sizes)} bytes")
-            return breakup_chunk(chunk, validate_crc=True)
-        if self.opcode == Opcode.SCHEMA:
-            return [Schema.read(stream)]
-        if self.opcode == Opcode.CHANNEL:
-            return [Channel.read(stream)]
-        return [Message.read(stream, len(self.payload))]
+def unpack(opcode: int, payload: bytes) -> list[McapRecord]:
+    """The schemas, channels and messages of a record; damaged bytes raise any exception."""
+    stream = ReadDataStream(BytesIO(payload))
+    if opcode == Opcode.CHUNK:
+        chunk = Chunk.read(stream)
+        sizes = [chunk.uncompressed_size]
+        if chunk.compression == "zstd":
+            sizes.append(zstandard.frame_content_size(chunk.data))
+        if max(sizes) > _MAX_CHUNK_SIZE:
+            raise ValueError(f"chunk of {max(sizes)} bytes")
+        return breakup_chunk(chunk, validate_crc=True)
+    if opcode == Opcode.SCHEMA:
+        return [Schema.read(stream)]
+    if opcode == Opcode.CHANNEL:
+        return [Channel.read(stream)]
+    return [Message.read(stream, len(payload))]
 
 
-def read_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
-    """Read the complete records that can contain messages, from the file's position on.
+def read_records(file: IO[bytes], damage: Damage) -> Iterator[tuple[int, int, bytes]]:
+    """Byte offset, opcode and content of the complete records that can contain messages.
 
     Args:
-        file: Seekable, positioned at the beginning of a record.
+        file: Seekable, positioned at the beginning of a record; read from there on.
         damage: Receives the damage at the end of the file.
     """
     offset = file.tell()
@@ -91,7 +83,7 @@ def read_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
         if len(head) < 9 or offset + 9 + length > size:
             return
         if head[0] in _MESSAGE_OPCODES:
-            yield RawRecord(offset, head[0], file.read(length))
+            yield offset, head[0], file.read(length)
         offset += 9 + length
         if head[0] == Opcode.FOOTER:
             file.seek(offset)
@@ -108,8 +100,8 @@ def no_log(path: Path) -> MissingPathError:
     )
 
 
-def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Message]]:
-    """Read the undamaged messages of an MCAP file with record and topic, in the file's order.
+def read_messages(path: Path, damage: Damage) -> Iterator[tuple[int, str, Message]]:
+    """The undamaged messages of an MCAP file with offset of the record, and topic; in its order.
 
     Raises:
         MissingPathError: There is no such file.
@@ -123,9 +115,9 @@ def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, 
     with file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordError("log", str(path), "an MCAP file")
-        for raw in read_records(file, damage):
+        for offset, opcode, payload in read_records(file, damage):
             try:
-                records = raw.unpack()
+                records = unpack(opcode, payload)
             except Exception:  # damaged bytes make the library raise exceptions of any kind
                 damage.bad_chunks += 1
                 continue
@@ -133,4 +125,4 @@ def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, 
                 if isinstance(record, Channel):
                     topic_names[record.id] = record.topic
                 elif isinstance(record, Message) and record.channel_id in topic_names:
-                    yield raw, topic_names[record.channel_id], record
+                    yield offset, topic_names[record.channel_id], record

@@ -11,14 +11,7 @@ from tautscope.log import topics
 from tautscope.log.cdr import Message
 from tautscope.log.fields import multi_array
 from tautscope.loop.kinematics import Floats
-from tautscope.loop.measurement import (
-    Measurement,
-    Points,
-    Pose,
-    Tip,
-    check_rotation,
-    raw_values,
-)
+from tautscope.loop.measurement import Measurement, Points, Pose, Tip, check_rotation, raw_values
 
 _TIMES = ("captured_at", "sensor")
 _QUATERNION = ("q_x", "q_y", "q_z", "q_w")

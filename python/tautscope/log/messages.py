@@ -14,14 +14,7 @@ from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import topics
 from tautscope.log.cdr import Message
-from tautscope.log.fields import (
-    diagnostics,
-    header_of,
-    joint_state,
-    multi_array,
-    offsets,
-    stamp_of,
-)
+from tautscope.log.fields import diagnostics, header_of, joint_state, multi_array, offsets, stamp_of
 from tautscope.log.measurements import measurement_messages, read_measurement, value_names
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
@@ -54,19 +47,13 @@ class Clock:
 
 
 class Codec:
-    """Conversion of the ticks and updates of a configuration.
-
-    Args:
-        config: Its degrees of freedom name the numbers.
-    """
+    """Conversion of the ticks and updates of a configuration; its DOFs name the numbers."""
 
     def __init__(self, config: Config) -> None:
         self._names = [dof.label for dof in config.dofs]
-        self._has_bands = not config.dof
-        columns = update_columns(config)
-        self._columns = columns.names or ()
-        self._numbers = [name for name in self._columns if columns[name].kind != "U"]
-        self._kinds = [columns[name] for name in self._columns]
+        own = topics.MEASUREMENT if config.dof else topics.MARKERS
+        self._update_topics = topics.UPDATE_TOPICS | {own}
+        self._columns = update_columns(config)
 
     def tick(
         self,
@@ -113,18 +100,13 @@ class Codec:
     def update(
         self, clock: Clock, now: float, seen: Frame | Measurement, report: Report, count: int
     ) -> Messages:
-        """The messages of an update; of an image all but the image, which is `image_message`.
+        """The messages of an update at rig time `now` [s]; the image's own is `image_message`.
 
-        Args:
-            clock: Of the run.
-            now: Rig time of the update [s].
-            seen: The frame or measurement.
-            report: Result of the update.
-            count: Number of the measurement in the run.
+        A measurement has the number `count` in the run, a frame its own.
         """
         stamp = clock.nanoseconds(report.captured_at)
-        row = dict(zip(self._columns, update_row(now, seen, report, count), strict=True))
-        numbers = {name: float(row[name]) for name in self._numbers}  # type: ignore[arg-type]
+        row = update_row(self._columns, now, seen, report, count)
+        numbers = {name: float(row[name]) for name in self._columns.names or () if name != "status"}
         if isinstance(seen, Frame):
             source, name, own = "endoscope", "images", {}
             features = [row[f"features_{name}"] for name in FEATURES]
@@ -167,19 +149,15 @@ class Codec:
         delta = _decoded(messages, topics.DELTA)
         self._check_names(topics.DELTA, delta.layout.dim[0].label.split(","))
         deltas = delta.data.reshape(len(self._names), 2)
-        row = tuple(
-            kind.type(known.get(name, np.nan if kind.kind == "f" else 0)).item()
-            for name, kind in zip(self._columns, self._kinds, strict=True)
-        )
-        measurement = None
-        if topics.MEASUREMENT in messages:
-            measurement = read_measurement(messages, self._names)
-        return row, deltas[:, 0], deltas[:, 1], measurement
+        row = np.zeros(1, self._columns)[0]
+        for name, (kind, *_) in (self._columns.fields or {}).items():
+            row[name] = known.get(name, np.nan if kind.kind == "f" else 0)
+        seen = read_measurement(messages, self._names) if topics.MEASUREMENT in messages else None
+        return row, deltas[:, 0], deltas[:, 1], seen
 
     def is_update(self, messages: Mapping[str, bytes]) -> bool:
         """Whether these are all messages of an update; a log may be damaged."""
-        own = topics.MARKERS if self._has_bands else topics.MEASUREMENT
-        return messages.keys() >= topics.UPDATE_TOPICS | {own}
+        return messages.keys() >= self._update_topics
 
     def _positions(self, messages: Mapping[str, bytes], topic: str) -> Floats:
         joints = _decoded(messages, topic)
@@ -210,13 +188,13 @@ class Codec:
         )
 
 
-def image_message(clock: Clock, captured_at: float, image_format: str, data: bytes) -> bytes:
-    """The message of a compressed image; the format is that of image_transport."""
-    header = header_of(clock.nanoseconds(captured_at), "endoscope")
+def image_message(captured_at: int, image_format: str, data: bytes) -> bytes:
+    """The message of a compressed image taken at a wall clock time [ns], in `ImageCodec.format`."""
+    header = header_of(captured_at, "endoscope")
     return topics.encode(topics.IMAGE, {"header": header, "format": image_format, "data": data})
 
 
-def request_messages(request: str) -> Messages:
+def request_messages(_: Clock, request: str) -> Messages:
     """The message of a request to the loop, as for `HysteresisReduction.on_event`."""
     return topics.encode_all({topics.EVENT: {"data": request}})
 

@@ -17,11 +17,11 @@ from tautscope.log import messages as msg
 from tautscope.log import topics
 from tautscope.log.header import read_header
 from tautscope.log.images import ImageCodec
-from tautscope.log.mcap_records import Damage, read_messages, read_records
+from tautscope.log.mcap_records import Damage, read_messages, read_records, unpack
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Sample
-from tautscope.runs.recording import Floats, Recording, update_columns
+from tautscope.runs.recording import Floats, Recording
 from tautscope.runs.run_recorder import Row, RunRecorder
 
 
@@ -47,12 +47,10 @@ class Update:
     raw: msg.Messages
 
     @property
-    def status(self) -> dict[str, Any]:
-        """Level, name and message of its status, and further texts by key under ``values``."""
+    def status(self) -> tuple[Any, dict[str, str]]:
+        """Its diagnostic_msgs/msg/DiagnosticStatus, and the values of this by key."""
         (status,) = topics.decode(topics.STATUS, self.raw[topics.STATUS]).status
-        values = {each.key: each.value for each in status.values}
-        level, name, message = status.level, status.name, status.message
-        return {"level": level, "name": name, "message": message, "values": values}
+        return status, {each.key: each.value for each in status.values}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +66,6 @@ class Log:
     """A log in memory, except its images, which are read from the file on demand.
 
     Attributes:
-        path: The file.
-        config: Configuration of the loop.
-        compensated: Whether the loop compensated.
         segments: Which DOF moved when.
         versions: Versions of the software that wrote it.
         events: Index -> tick, update or request, in the loop's order. Indices start at 1; a
@@ -89,11 +84,6 @@ class Log:
     damage: Damage
     _images: dict[int, tuple[int, int]] = field(repr=False)
     """Index -> offset of the chunk in the file, and channel of the images."""
-
-    @cached_property
-    def update_names(self) -> tuple[str, ...]:
-        """Names of the numbers of `Update.row`."""
-        return update_columns(self.config).names or ()
 
     def has_input(self, index: int) -> bool:
         """Whether the image or the measurement of an update is in the log."""
@@ -135,10 +125,10 @@ class Log:
         at, channel = self._images[index]
         with self.path.open("rb") as file:
             file.seek(at)
-            record = next(read_records(file, Damage()))
+            _, opcode, payload = next(read_records(file, Damage()))
         data = next(
             message.data
-            for message in record.unpack()
+            for message in unpack(opcode, payload)
             if isinstance(message, Message)
             and (message.channel_id, message.sequence) == (channel, index)
         )
@@ -152,7 +142,7 @@ class Log:
             if isinstance(event, Tick):
                 recorder.add_tick(event.sample, event.reference, event.command)
             elif isinstance(event, Update):
-                recorder.add_frame(event.row, event.delta_minus, event.delta_plus)
+                recorder.add_row(event.row, event.delta_minus, event.delta_plus)
         return Recording(*recorder.tables(), self.config, self.compensated, self.segments)
 
 
@@ -170,15 +160,15 @@ def read_log(path: str | PathLike[str]) -> Log:
     groups: defaultdict[int, msg.Messages] = defaultdict(dict)
     images: dict[int, tuple[int, int]] = {}
     warnings: list[str] = []
-    for raw, topic, record in read_messages(file, damage):
+    for offset, topic, record in read_messages(file, damage):
         if topic == topics.IMAGE:
-            images[record.sequence] = raw.offset, record.channel_id
+            images[record.sequence] = offset, record.channel_id
         elif topic == topics.WARNING:
             warnings.append(topics.decode(topic, record.data).msg)
         elif topic in topics.TYPES:
             groups[record.sequence][topic] = record.data
-    info, versions = read_header(groups.pop(0, {}))
-    codec = msg.Codec(info.config)
+    header = read_header(groups.pop(0, {}))
+    codec = msg.Codec(header[0])
     events: dict[int, Tick | Update | Request] = {}
     for index, messages in sorted(groups.items()):
         if messages.keys() >= topics.TICK_TOPICS:
@@ -188,14 +178,5 @@ def read_log(path: str | PathLike[str]) -> Log:
         elif topics.EVENT in messages:
             text = topics.decode(topics.EVENT, messages[topics.EVENT]).data
             events[index] = Request(text, messages)
-    return Log(
-        file,
-        info.config,
-        info.compensated,
-        info.segments,
-        versions,
-        events,
-        tuple(warnings),
-        damage,
-        {index: location for index, location in images.items() if index in events},
-    )
+    shown = {index: location for index, location in images.items() if index in events}
+    return Log(file, *header, events, tuple(warnings), damage, shown)

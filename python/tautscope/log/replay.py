@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +20,18 @@ from tautscope.log import messages as msg
 from tautscope.log.reader import Log, Request, Tick, Update
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, Floats, Recording
-from tautscope.runs.run_recorder import RunRecorder, update_row
+from tautscope.runs.run_recorder import RunRecorder
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
 
 _WITH_TICK = "a log with a tick before the first missing message"
+# Commands were executed already and may be faster than an operator; codecs repeat frames.
+_IGNORED = ("reference_jump", "reference_fast", "reference_late", "late_tick", "monitor", "frozen")
 PREPARE = "prepare_detection "
 """Begin of the request to prepare the detection of a frame, before its sequence number."""
 SeenFrame = tuple[float, Frame, int]
@@ -101,8 +104,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             ready = prepared.pop(index, None)
             now, seen, count = ready[0] if ready else _seen(log, index)
             report = loop.on_detection(ready[0][1], ready[1]()) if ready else _update(loop, seen)
-            row = update_row(now, seen, report, count)
-            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+            recorder.add_update(now, seen, report, count)
             replayed = codec.update(clock, now, seen, report, count)
             comparison.updates += 1
             name = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
@@ -163,7 +165,7 @@ def _seen(log: Log, index: int) -> Seen:
     """Frame or measurement of a recorded update, as the loop got it."""
     update = log.events[index]
     assert isinstance(update, Update)
-    row: dict[str, Any] = dict(zip(log.update_names, update.row, strict=True))
+    row = update.row
     now, count = float(row["arrived_at"]), int(row["sequence"])
     if update.measurement is not None:
         return now, update.measurement, count
@@ -192,14 +194,14 @@ def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
     if recorded != given:
         allowed = f"those of the log: {', '.join(recorded)}"
         raise ConfigError("dof", ", ".join(given), allowed)
-    run = _estimate(_log_inputs(log), config, log.compensated)
+    run = _estimate(_log_inputs(log), config, log.compensated, log.segments)
     if not len(run.trace):
         raise RecordError("log", "no tick", _WITH_TICK)
     skipped = sum(
         isinstance(event, Update) and not log.has_input(index)
         for index, event in log.events.items()
     )
-    return Recording(run.trace, run.frames, config, log.compensated, log.segments), skipped
+    return run, skipped
 
 
 def estimate_from_video(
@@ -222,7 +224,7 @@ def estimate_from_video(
         RecordError: No frame is within the time of the motor positions.
         FrameError: The video is not from the configured camera.
     """
-    run = _estimate(_video_inputs(frames, times, positions, progress), config, False)
+    run = _estimate(_video_inputs(frames, times, positions, progress), config, False, ())
     if not len(run.frames):
         span = f"frames between {times[0]:g} and {times[-1]:g} s, the time of the motor positions"
         raise RecordError("video", "no frame in that time", span)
@@ -270,18 +272,11 @@ def _video_inputs(
     yield from ticks[at:]
 
 
-def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
-    # Without compensation the loop passes commands on and only estimates. Some detectors are off:
-    # the commands were executed already and may be faster than an operator; codecs repeat frames.
-    ignored = (
-        "reference_jump",
-        "reference_fast",
-        "reference_late",
-        "late_tick",
-        "monitor",
-        "frozen",
-    )
-    off = {"safety.off": [*config.safety.off, *ignored]}
+def _estimate(
+    inputs: Inputs, config: Config, compensated: bool, segments: tuple[Segment, ...]
+) -> Recording:
+    # Without compensation the loop passes commands on and only estimates.
+    off = {"safety.off": [*config.safety.off, *_IGNORED]}
     loop = HysteresisReduction(config.replace(**off), compensate=False)
     recorder = RunRecorder(config)
     for each in inputs:
@@ -289,8 +284,6 @@ def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
             loop.step(each.command, each.sample.time)
             recorder.add_tick(each.sample, each.reference, each.command)
         else:
-            arrived_at, seen, count = each
-            report = _update(loop, seen)
-            row = update_row(arrived_at, seen, report, count)
-            recorder.add_frame(row, report.delta_minus, report.delta_plus)
-    return Recording(*recorder.tables(), config, compensated, ())
+            now, seen, count = each
+            recorder.add_update(now, seen, _update(loop, seen), count)
+    return Recording(*recorder.tables(), config, compensated, segments)

@@ -139,13 +139,12 @@ class _Chunks:
         for event in self._log.events.values():
             if not isinstance(event, Update):
                 continue
-            status = event.status
-            values = status["values"]
-            text = f"{status['name']}: {status['message']}, reaction: {values['reaction']}"
+            status, values = event.status
+            text = f"{status.name}: {status.message}, reaction: {values['reaction']}"
             text += f", warnings: {values['warnings']}" if values["warnings"] else ""
             if text != previous:
-                level = rr.TextLogLevel.WARN if status["level"] else rr.TextLogLevel.INFO
-                yield self._text("status", event.row[0], text, level)
+                level = rr.TextLogLevel.WARN if status.level else rr.TextLogLevel.INFO
+                yield self._text("status", event.row["captured_at"], text, level)
                 previous = text
 
     def _messages(self) -> Iterator[Chunk]:
@@ -166,7 +165,8 @@ class _Chunks:
                 columns = rr.EncodedImage.columns(
                     blob=[bytes(image.data)], media_type=[f"image/{kind}"]
                 )
-                yield Chunk.from_columns("endoscope/image", self._at(event.row[0]), columns)
+                at = self._at(event.row["captured_at"])
+                yield Chunk.from_columns("endoscope/image", at, columns)
                 self.images += 1
 
     def _text(self, entity: str, now: object, text: str, level: Utf8Like) -> Chunk:

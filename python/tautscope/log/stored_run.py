@@ -104,9 +104,9 @@ def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
     summary = FlagSummary(recording.config)
     elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
     for at, (_, update) in zip(elapsed, _updates(log), strict=True):
-        values = update.status["values"]
+        _, values = update.status
         summary.add(float(at), values["warnings"].split(","), Reaction(values["reaction"]))
-    return summary.lines(summary.names)
+    return summary.lines()
 
 
 def _checked(recording: Recording, path: Path) -> Recording:

@@ -8,52 +8,36 @@ from typing import Any
 
 from tautscope.log import cdr
 
-CONFIG = "/tautscope/config"
-RUN = "/tautscope/run"
-VERSIONS = "/tautscope/versions"
-CAMERA_INFO = "/endoscope/camera_info"
-REFERENCE = "/instrument/servo_jp"
-COMMAND = "/instrument/actuators/setpoint_js"
-APPLIED = "/instrument/actuators/measured_js"
-TRUTH = "/twin/measured_js"
-TICK = "/tautscope/tick"
-MADE_AT = "/tautscope/made_at"
-IMAGE = "/endoscope/image_raw/compressed"
-ESTIMATE = "/instrument/measured_js"
-DELTA = "/instrument/hysteresis/delta"
-MARKERS = "/endoscope/markers"
-MEASUREMENT = "/tautscope/measurement"
-COVARIANCE = "/tautscope/measurement/covariance"
-POSE = "/tip/measured_cp"
-STATUS = "/tautscope/status"
-UPDATE = "/tautscope/image_update"
-EVENT = "/tautscope/event"
-WARNING = "/tautscope/warning"
+TYPES: dict[str, str] = {}
+"""Topic -> ROS 2 message type; the channels of a log are in this order."""
 
-TYPES = {
-    CONFIG: "std_msgs/msg/String",
-    RUN: "std_msgs/msg/String",
-    VERSIONS: "std_msgs/msg/String",
-    CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
-    REFERENCE: "sensor_msgs/msg/JointState",
-    COMMAND: "sensor_msgs/msg/JointState",
-    APPLIED: "sensor_msgs/msg/JointState",
-    TRUTH: "sensor_msgs/msg/JointState",
-    TICK: "std_msgs/msg/Float64",
-    MADE_AT: "std_msgs/msg/Float64",
-    IMAGE: "sensor_msgs/msg/CompressedImage",
-    ESTIMATE: "sensor_msgs/msg/JointState",
-    DELTA: "std_msgs/msg/Float64MultiArray",
-    MARKERS: "std_msgs/msg/Float64MultiArray",
-    STATUS: "diagnostic_msgs/msg/DiagnosticArray",
-    UPDATE: "std_msgs/msg/Float64MultiArray",
-    EVENT: "std_msgs/msg/String",
-    WARNING: "rcl_interfaces/msg/Log",
-    MEASUREMENT: "std_msgs/msg/Float64MultiArray",
-    COVARIANCE: "std_msgs/msg/Float64MultiArray",
-    POSE: "geometry_msgs/msg/PoseStamped",
-}
-"""Topic -> ROS 2 message type."""
+
+def _topic(name: str, kind: str) -> str:
+    TYPES[name] = kind
+    return name
+
+
+CONFIG = _topic("/tautscope/config", "std_msgs/msg/String")
+RUN = _topic("/tautscope/run", "std_msgs/msg/String")
+VERSIONS = _topic("/tautscope/versions", "std_msgs/msg/String")
+CAMERA_INFO = _topic("/endoscope/camera_info", "sensor_msgs/msg/CameraInfo")
+REFERENCE = _topic("/instrument/servo_jp", "sensor_msgs/msg/JointState")
+COMMAND = _topic("/instrument/actuators/setpoint_js", "sensor_msgs/msg/JointState")
+APPLIED = _topic("/instrument/actuators/measured_js", "sensor_msgs/msg/JointState")
+TRUTH = _topic("/twin/measured_js", "sensor_msgs/msg/JointState")
+TICK = _topic("/tautscope/tick", "std_msgs/msg/Float64")
+MADE_AT = _topic("/tautscope/made_at", "std_msgs/msg/Float64")
+IMAGE = _topic("/endoscope/image_raw/compressed", "sensor_msgs/msg/CompressedImage")
+ESTIMATE = _topic("/instrument/measured_js", "sensor_msgs/msg/JointState")
+DELTA = _topic("/instrument/hysteresis/delta", "std_msgs/msg/Float64MultiArray")
+MARKERS = _topic("/endoscope/markers", "std_msgs/msg/Float64MultiArray")
+STATUS = _topic("/tautscope/status", "diagnostic_msgs/msg/DiagnosticArray")
+UPDATE = _topic("/tautscope/image_update", "std_msgs/msg/Float64MultiArray")
+EVENT = _topic("/tautscope/event", "std_msgs/msg/String")
+WARNING = _topic("/tautscope/warning", "rcl_interfaces/msg/Log")
+MEASUREMENT = _topic("/tautscope/measurement", "std_msgs/msg/Float64MultiArray")
+COVARIANCE = _topic("/tautscope/measurement/covariance", "std_msgs/msg/Float64MultiArray")
+POSE = _topic("/tip/measured_cp", "geometry_msgs/msg/PoseStamped")
 
 TICK_TOPICS = {REFERENCE, COMMAND, APPLIED, TICK}
 """Topics that every control tick has."""

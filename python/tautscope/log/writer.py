@@ -12,7 +12,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,6 @@ from tautscope.config import Config
 from tautscope.config.recording import IMAGE_FORMATS, ImageFormat
 from tautscope.errors import FieldError, notes
 from tautscope.log import messages as msg
-from tautscope.log.header import RunInfo
 from tautscope.log.journal import POLL_PERIOD, Journal
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
@@ -31,10 +31,7 @@ from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
 
 _LOG = logging.getLogger(__name__)
-_ENDS = {
-    KeyboardInterrupt: "the run was interrupted",
-    SystemExit: "the run was terminated",
-}
+_ENDS = {KeyboardInterrupt: "the run was interrupted", SystemExit: "the run was terminated"}
 """How a run ended, by the exception's type."""
 
 
@@ -124,8 +121,8 @@ class LogWriter:
         self.image_format = config.recording.image_format
         self._wait = wait
         self._ticks = self._updates = self._index = 0
-        info = RunInfo(config, compensate, tuple(segments))
-        self._journal = Journal(Path(path), info, on_warning)
+        self._codec, self._clock = msg.Codec(config), msg.Clock(0.0, 0)
+        self._journal = Journal(Path(path), config, compensate, segments, on_warning)
 
     @property
     def image_format(self) -> ImageFormat:
@@ -153,7 +150,9 @@ class LogWriter:
         # Copies, because the caller may reuse its arrays before they are written.
         truth = None if sample.true_state is None else np.array(sample.true_state)
         copy = Sample(sample.time, np.array(sample.applied), None, truth)
-        self._enqueue(sample.time, (copy, np.array(reference), np.array(command), made_at))
+        self._enqueue(
+            sample.time, self._codec.tick, copy, np.array(reference), np.array(command), made_at
+        )
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """Record an image update, after the tick whose sample has the frame.
@@ -164,17 +163,16 @@ class LogWriter:
             report: Result of the update.
         """
         self._updates += 1
-        frame_info = Frame(
-            np.empty(0, np.uint8), frame.captured_at, frame.sequence, frame.true_features
-        )
-        if not self._enqueue(now, (now, frame_info, report, self._updates)):
+        info = replace(frame, image=np.empty(0, np.uint8))
+        if not self._enqueue(now, self._codec.update, now, info, report, self._updates):
             return
         journal = self._journal
         if not self._has_room(journal.images, self._settings.queue_images):
             journal.dropped_images += 1
             return
+        at, captured_at = map(self._clock.nanoseconds, (now, frame.captured_at))
         image = frame.image.copy()
-        journal.images.append((self._index, now, frame.captured_at, image, self.image_format))
+        journal.images.append((self._index, at, captured_at, image, self.image_format))
 
     def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
         """Record an update by another sensor, after the tick whose sample has the measurement.
@@ -185,14 +183,15 @@ class LogWriter:
             report: Result of the update.
         """
         self._updates += 1
-        self._enqueue(now, (now, deepcopy(measurement), report, self._updates))
+        copy = deepcopy(measurement)
+        self._enqueue(now, self._codec.update, now, copy, report, self._updates)
 
     def event(self, now: float, request: str) -> None:
         """Record a request of the operator or the rig to the loop, at a rig time [s].
 
         In your own loop: ``loop.on_event = lambda request: log.event(sample.time, request)``.
         """
-        self._enqueue(now, (request,))
+        self._enqueue(now, msg.request_messages, request)
 
     def warn(self, text: str) -> None:
         """Record a warning."""
@@ -217,15 +216,8 @@ class LogWriter:
         """Write the queues, finish the file and return its summary. May be called twice."""
         journal = self._journal
         journal.close(self._settings.close_timeout)
-        return LogSummary(
-            journal.path,
-            dict(journal.written),
-            self._ticks,
-            self._updates,
-            journal.dropped,
-            journal.dropped_images,
-            journal.failure,
-        )
+        losses = journal.dropped, journal.dropped_images, journal.failure
+        return LogSummary(journal.path, dict(journal.written), self._ticks, self._updates, *losses)
 
     def __enter__(self) -> LogWriter:
         return self
@@ -236,18 +228,20 @@ class LogWriter:
             self.warn("; ".join([_ENDS.get(type(error), ended), *notes(error)]))
         self.close()
 
-    def _enqueue(self, now: float, arguments: tuple[Any, ...]) -> bool:
+    def _enqueue(self, now: float, encode: Callable[..., msg.Messages], *arguments: Any) -> bool:
+        """Queue what a thread encodes: a function of the clock and of arguments."""
         journal = self._journal
-        if journal.clock is None:
-            journal.clock = msg.Clock(now, time.time_ns())
+        if not self._index:
+            self._clock = msg.Clock(now, time.time_ns())
         self._index += 1
         if not self._has_room(journal.events, self._settings.queue_events):
             journal.dropped += 1
             return False
-        journal.events.append((self._index, now, arguments))
+        messages = partial(encode, self._clock, *arguments)
+        journal.events.append((self._index, self._clock.nanoseconds(now), messages))
         return True
 
     def _has_room(self, queue: deque[Any], limit: int) -> bool:
-        while self._wait and len(queue) >= limit and not self._journal.is_done:
+        while self._wait and len(queue) >= limit and not self._journal.done.is_set():
             time.sleep(POLL_PERIOD)
-        return len(queue) < limit and not self._journal.is_done
+        return len(queue) < limit and not self._journal.done.is_set()

@@ -10,7 +10,7 @@ from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Sample
 from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
 from tautscope.runs.recording import Floats, Recording
-from tautscope.runs.run_recorder import RunRecorder, update_row
+from tautscope.runs.run_recorder import RunRecorder
 
 WINDOW = 120.0
 """Duration of the ticks that are kept, with and without compensation each [s]."""
@@ -41,8 +41,7 @@ class Achieved:
         self._updates += 1
         # What was captured earlier shows the tip with another share.
         if self._share in self._recorders and source.captured_at >= self._since:
-            row = update_row(now, source, report, self._updates)
-            self._recorders[self._share].add_frame(row, report.delta_minus, report.delta_plus)
+            self._recorders[self._share].add_update(now, source, report, self._updates)
 
     def results(self) -> OperatorResults:
         """Of each degree of freedom; none where the tip was not measured with compensation."""

@@ -59,10 +59,8 @@ def _columns(arrays: Arrays, count: int) -> Iterator[tuple[str, NDArray[Any]]]:
         else:
             continue
         for number, column in enumerate(table.T, 1):
-            yield (
-                (name if table.shape[1] == 1 else f"{name}.{number}"),
-                np.ascontiguousarray(column),
-            )
+            title = name if table.shape[1] == 1 else f"{name}.{number}"
+            yield title, np.ascontiguousarray(column)
 
 
 def _from_numpy(data: bytes, file: str) -> Arrays:
@@ -76,9 +74,9 @@ def _from_numpy(data: bytes, file: str) -> Arrays:
 
 
 def _from_matlab(data: bytes, file: str) -> Arrays:
-    """In a process of its own: SciPy's reader may crash it on a damaged file."""
+    """In a process of its own, of this file: SciPy's reader may crash it on a damaged file."""
     require_module("scipy", "reading a .mat file", "analysis")
-    command = [sys.executable, "-m", "tautscope.runs.matlab_file"]
+    command = [sys.executable, "-m", __name__]
     done = subprocess.run(command, input=data, capture_output=True, check=False)
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").splitlines()
@@ -115,3 +113,28 @@ def with_single_numbers(
             for k, end in enumerate(ends)
         ]
     return pl.DataFrame(columns)
+
+
+def _from_mat_to_npz() -> None:
+    """A .mat file on standard input becomes a .npz file on standard output."""
+    from scipy.io import loadmat  # noqa: PLC0415  an extra
+
+    try:
+        found = loadmat(io.BytesIO(sys.stdin.buffer.read()), simplify_cells=True)
+        arrays = dict(_numeric("", found))
+    except Exception as error:  # of any kind, for a damaged file
+        raise SystemExit(f"{type(error).__name__}: {error}") from None
+    np.savez(sys.stdout.buffer, **arrays)  # type: ignore[arg-type]
+
+
+def _numeric(prefix: str, found: dict[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays of numbers, those of structs as NAME.FIELD."""
+    for name, value in found.items():
+        if isinstance(value, dict):
+            yield from _numeric(f"{prefix}{name}.", value)
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+            yield prefix + name, value
+
+
+if __name__ == "__main__":
+    _from_mat_to_npz()

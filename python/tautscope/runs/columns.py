@@ -4,14 +4,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.errors import RecordError
-from tautscope.runs.pose_columns import find_axes, title_of
+from tautscope.runs.pose_columns import Floats, find_axes, title_of
 from tautscope.runs.tables import Sheet, filled
 from tautscope.runs.units import TIMES, split_unit
-
-Floats = NDArray[np.float64]
 
 _TIMES = {"time", "t", "timestamp", "stamp", "timestamps", "zeit", "datetime", "sec", "seconds"}
 _COMMANDS = (
@@ -46,9 +43,7 @@ def time_column(titles: list[str]) -> str | None:
     return None
 
 
-def list_columns(
-    sheet: Sheet,
-) -> tuple[list[Column], list[tuple[str, str]], list[RecordError]]:
+def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]], list[RecordError]]:
     """Columns of numbers, pairs of command and tip, and why other columns are left out.
 
     The most likely pair is the first.
@@ -71,13 +66,11 @@ def list_columns(
         if not len(seen):
             left_out.append(RecordError(f"{sheet.file}, column {title}", "no value", "numbers"))
             continue
-        is_alone = sheet.titles.count(title) == 1
-        name = title if is_alone else str(index + 1)
-        unit = sheet.unit(index)
-        found = Column(index + 1, title, unit, len(seen), float(seen.min()), float(seen.max()))
-        columns.append(found)
+        least, largest = float(seen.min()), float(seen.max())
+        columns.append(Column(index + 1, title, sheet.unit(index), len(seen), least, largest))
         is_counter = np.all(np.diff(seen) > 0)
-        if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
+        if title != time and not is_counter and len(seen) > 3 and least < largest:
+            name = title if sheet.titles.count(title) == 1 else str(index + 1)
             moving[name] = filled(values)[:: -(-len(values) // _ENOUGH)]
     if not columns:
         begin = f"the data begin at {sheet.line} {sheet.rows[0]}" if len(sheet.rows) else "no data"
@@ -120,15 +113,10 @@ def _rank(name: str) -> int:
 
 
 def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
-    named = 1.0 if {_rank(one), _rank(other)} == {-1, 1} else 0.0
-    a, b = (_unit(values[name]) for name in (one, other))
-    return named + abs(float(a @ b))
-
-
-def _unit(values: Floats) -> Floats:
-    """Deviations from the mean, of length 1; 0 if there are none."""
-    centred = np.asarray(values - values.mean())
-    return centred / (float(np.linalg.norm(centred)) or 1.0)
+    """Magnitude of the correlation, and 1 more if the names are of a command and of a tip."""
+    a, b = (values[name] - values[name].mean() for name in (one, other))
+    a, b = (each / (float(np.linalg.norm(each)) or 1.0) for each in (a, b))
+    return ({_rank(one), _rank(other)} == {-1, 1}) + abs(float(a @ b))
 
 
 def _ordered(one: str, other: str, values: dict[str, Floats]) -> tuple[str, str]:

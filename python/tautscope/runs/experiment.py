@@ -16,7 +16,7 @@ from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
 from tautscope.runs.control_loop import ControlLoop, Floats, ImageUpdate, Log, Monitor
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording, Snapshot
-from tautscope.runs.run_recorder import RunRecorder, update_row
+from tautscope.runs.run_recorder import RunRecorder
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
@@ -153,8 +153,7 @@ class _ExperimentRecorder(RunRecorder):
         self, now: float, source: Frame | Measurement, report: Report, elapsed: float
     ) -> None:
         self._measurements += not isinstance(source, Frame)
-        row = update_row(now, source, report, self._measurements)
-        self.add_frame(row, report.delta_minus, report.delta_plus)
+        self.add_update(now, source, report, self._measurements)
         self.flags.add(elapsed, report.warnings, report.reaction)
         detection, is_late = report.detection, elapsed >= self._snapshot_after
         if not isinstance(source, Frame) or detection is None or not detection.valid:

@@ -47,17 +47,12 @@ class FlagSummary:
             elif name.endswith(LIMITED):
                 self._limited[name] = None
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The flags that were in force at an update."""
-        return tuple(self._counts)
+    def lines(self, latched: Sequence[str] | None = None) -> tuple[str, ...]:
+        """A line for each latched flag, by default for each that was in force at an update.
 
-    def lines(self, latched: Sequence[str]) -> tuple[str, ...]:
-        """A line for each latched flag, by the names of `tautscope.loop.safety.DETECTORS`.
-
-        A flag that was in force at no update was raised and cleared between two.
+        One that was in force at none was raised and cleared between two.
         """
-        return tuple(self._line(name) for name in latched)
+        return tuple(self._line(name) for name in (self._counts if latched is None else latched))
 
     def _line(self, name: str) -> str:
         meaning = MEANINGS[name].rstrip(".").replace("`", "")

@@ -181,13 +181,9 @@ class Recording:
         except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, TypeError) as error:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
-        return cls(
-            trace=_read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
-            frames=_read_csv(place / f"frames{suffix}.csv", update_columns(config)),
-            config=config,
-            compensated=compensated,
-            segments=segments,
-        )
+        trace = _read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs))
+        frames = _read_csv(place / f"frames{suffix}.csv", update_columns(config))
+        return cls(trace, frames, config, compensated, segments)
 
 
 def run_facts(compensated: bool, segments: Iterable[Segment]) -> dict[str, Any]:
@@ -238,12 +234,7 @@ def _write_csv(path: Path, table: Table) -> None:
 
 
 def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
-    """Read a file of `_write_csv`; equal to what was written, to the last bit.
-
-    Raises:
-        MissingPathError: The file does not exist.
-        RecordError: A column or a cell is not as `_write_csv` writes it.
-    """
+    """Read a file of `_write_csv`; equal to what was written, to the last bit."""
     if not path.is_file():
         raise MissingPathError("recording", str(path), "a file of a saved recording")
     try:

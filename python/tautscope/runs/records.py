@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
+from tautscope.runs.pose_columns import Floats
 from tautscope.runs.tables import Sheet, filled, open_table, read_table
 from tautscope.runs.units import TIMES, time_scale, units_of
-
-Floats = NDArray[np.float64]
 
 GAP = 10.0
 """A sampling interval above this many medians is a gap."""
@@ -84,6 +83,11 @@ class Record:
         samples = np.arange(len(self.command), dtype=np.float64)
         return self.time if self.is_timed and self.time is not None else samples
 
+    @property
+    def clock_unit(self) -> str:
+        """Of the `clock`: s or samples."""
+        return "s" if self.is_timed else "samples"
+
     def part(self, samples: slice | NDArray[np.intp]) -> Record:
         """The record of some samples; gaps and other counts stay those of the file."""
         return replace(
@@ -139,12 +143,8 @@ def read_record(
         tip, tip_rows, tip_units, tip_start = _read(tips, (measured,), time)
         tip[:, -1] += (tip_start - motor_start) / 1e9  # dates count from the first of each file
         nothing = [np.full((len(each), 1), np.nan) for each in (motor, tip)]
-        table = np.vstack(
-            [
-                np.hstack([motor[:, :1], nothing[0], motor[:, 1:]]),
-                np.hstack([nothing[1], tip]),
-            ]
-        )
+        motor = np.hstack([motor[:, :1], nothing[0], motor[:, 1:]])
+        table = np.vstack([motor, np.hstack([nothing[1], tip])])
         order = np.argsort(table[:, 2], kind="stable")
         table, rows = table[order], np.concatenate([motor_rows, tip_rows])[order]
         units = motor_units[:1] + tip_units
@@ -180,17 +180,16 @@ def _read(
     wanted = names if time is None else (*names, time)
     found = sheet.read(wanted)
     table = np.stack([found.columns[name] for name in wanted], axis=1)
-    if time is not None:
-        stamps = table[:, -1]
-        if not np.isfinite(stamps).any():
-            raise RecordError(f"{sheet.file}, column {time}", "no time", "one in each line")
-        unit = found.units.get(time, "")
-        if unit and unit not in TIMES:
-            allowed = f"one of {', '.join(TIMES)}"
-            raise RecordError(f"{sheet.file}, column {time}", f"unit {unit}", allowed)
-        table[:, -1] = stamps * (TIMES[unit] if unit else time_scale(float(np.nanmedian(stamps))))
     units = tuple(found.units.get(name, "") for name in wanted)
-    return table, found.rows, units, 0 if time is None else found.starts[time]
+    if time is None:
+        return table, found.rows, units, 0
+    stamps, unit, where = table[:, -1], units[-1], f"{sheet.file}, column {time}"
+    if not np.isfinite(stamps).any():
+        raise RecordError(where, "no time", "one in each line")
+    if unit and unit not in TIMES:
+        raise RecordError(where, f"unit {unit}", f"one of {', '.join(TIMES)}")
+    table[:, -1] = stamps * (TIMES[unit] if unit else time_scale(float(np.nanmedian(stamps))))
+    return table, found.rows, units, found.starts[time]
 
 
 def read_motors(

@@ -36,8 +36,7 @@ def predict_tip(
     if len(command) != len(measured):
         allowed = f"as many as command: {len(command)}"
         raise SignalError("measured", f"{len(measured)} samples", allowed)
-    predicted, delta_minus, delta_plus = estimator.run(command, measured)
-    return predicted, delta_minus, delta_plus
+    return estimator.run(command, measured)
 
 
 def _signal(name: str, values: ArrayLike) -> Floats:

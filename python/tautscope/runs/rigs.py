@@ -41,7 +41,8 @@ def rig_maker(name: str, **arguments: Any) -> Callable[[Config], Rig]:
 
     def make(config: Config) -> Rig:
         rig = made(*([config] if takes_config else []), **arguments)
-        missing = [part for part in _PARTS if not hasattr(rig, part)]
+        parts = ("control_period", "reset", "step", "close")
+        missing = [part for part in parts if not hasattr(rig, part)]
         if missing:
             raise ConfigError(field, name, f"a rig with {', '.join(missing)}: tautscope.Rig")
         period = config.control.period
@@ -52,6 +53,3 @@ def rig_maker(name: str, **arguments: Any) -> Callable[[Config], Rig]:
         return with_actuators(rig, config)
 
     return make
-
-
-_PARTS = ("control_period", "reset", "step", "close")

@@ -1,22 +1,18 @@
 """Recorder of a run: one row per control tick, one row per image."""
 
-from __future__ import annotations
-
 from collections import deque
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.measurement import Measurement
+from tautscope.loop.reduction import Report
+from tautscope.loop.rig import Frame, Sample
 from tautscope.runs.recording import Floats, Table, per_dof, trace_columns, update_columns
 
-if TYPE_CHECKING:
-    from tautscope.loop.reduction import Report
-    from tautscope.loop.rig import Frame, Sample
-
-Row = tuple[object, ...]
+Row = np.void
+"""Of a table; its fields are the columns."""
 _USED = ("ok", "held", "partial")
 """Status of a measurement that was used."""
 _BLOCK = 100
@@ -24,12 +20,14 @@ _BLOCK = 100
 _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 
 
-def update_row(now: float, seen: Frame | Measurement, report: Report, count: int) -> Row:
-    """Result of an update in the order of `update_columns`; the true state comes later.
+def update_row(
+    columns: np.dtype[np.void], now: float, seen: Frame | Measurement, report: Report, count: int
+) -> Row:
+    """Result of an update in `update_columns`; the true state comes later.
 
     A measurement has the number `count`, a frame its own; `now` is the time of arrival [s].
     """
-    features: Row = ()
+    features: tuple[float, ...] = ()
     if isinstance(seen, Measurement):
         is_valid = report.status in _USED
     else:
@@ -38,18 +36,11 @@ def update_row(now: float, seen: Frame | Measurement, report: Report, count: int
         found = detection.features if detection is not None and is_valid else _NO_FEATURES
         truth = _NO_FEATURES if seen.true_features is None else seen.true_features
         features = (*found, *report.predicted_features, *report.innovation, *truth)
-    return (
-        report.captured_at,
-        now,
-        count,
-        str(report.status),
-        is_valid,
-        *report.state_estimate,
-        *report.predicted_state,
-        *(np.nan for _ in report.state_estimate),
-        *report.observable,
-        *features,
-    )
+    facts = report.captured_at, now, count, str(report.status), is_valid
+    unknown = (np.nan for _ in report.state_estimate)
+    states = *report.state_estimate, *report.predicted_state, *unknown
+    row: Row = np.array([(*facts, *states, *report.observable, *features)], columns)[0]
+    return row
 
 
 class _RowBuffer:
@@ -58,9 +49,9 @@ class _RowBuffer:
     def __init__(self, columns: np.dtype[np.void], most: int | None) -> None:
         self._columns = columns
         self._packed: deque[Table] = deque(maxlen=None if most is None else most // _BLOCK)
-        self._rows: list[Row] = []
+        self._rows: list[Row | tuple[object, ...]] = []
 
-    def append(self, row: Row) -> None:
+    def append(self, row: Row | tuple[object, ...]) -> None:
         self._rows.append(row)
         if len(self._rows) == _BLOCK:
             self._pack()
@@ -92,33 +83,27 @@ class RunRecorder:
         self._trace = _RowBuffer(trace_columns(config.dofs), most)
         self._frames = _RowBuffer(self._columns, most)
         self._unknown = (np.nan,) * len(config.dofs)
-        self._estimate: Row = self._unknown
+        self._estimate = self._unknown
         own = config.dof or [config[dof] for dof in Dof]
-        self._deltas: Row = (*(dof.delta_minus for dof in own), *(dof.delta_plus for dof in own))
+        self._deltas = *(dof.delta_minus for dof in own), *(dof.delta_plus for dof in own)
         self._status = "none"
 
     def add_tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
         """Add a control tick: the rig's sample, the reference and the command given then."""
         truth = self._unknown if sample.true_state is None else sample.true_state
-        self._trace.append(
-            (
-                sample.time,
-                *reference,
-                *command,
-                *sample.applied,
-                *self._estimate,
-                *truth,
-                *self._deltas,
-                self._status,
-            )
-        )
+        states = *reference, *command, *sample.applied, *self._estimate, *truth
+        self._trace.append((sample.time, *states, *self._deltas, self._status))
 
-    def add_frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
+    def add_update(self, now: float, seen: Frame | Measurement, report: Report, count: int) -> None:
+        """Add an update, see `update_row`."""
+        row = update_row(self._columns, now, seen, report, count)
+        self.add_row(row, report.delta_minus, report.delta_plus)
+
+    def add_row(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
         """Add an update: its `update_row`, and the contact offsets (n,) after it."""
-        fields = dict(zip(self._columns.names or (), row, strict=True))
-        self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in self._dofs)
+        self._estimate = tuple(row[f"estimate_{dof.label}"] for dof in self._dofs)
         self._deltas = (*delta_minus, *delta_plus)
-        self._status = str(fields["status"])
+        self._status = str(row["status"])
         self._frames.append(row)
 
     def tables(self) -> tuple[Table, Table]:

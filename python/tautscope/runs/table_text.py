@@ -31,7 +31,7 @@ class TableText:
     """Data lines of a table, and what is above them.
 
     Attributes:
-        titles: Of the columns; empty if there is no title row.
+        titles: Of the columns; their numbers where there is no title.
         groups: Titles above the titles, each for all columns up to the next; empty if there are
             none.
         units: Of a line of units below the titles; empty if there is none.
@@ -42,7 +42,6 @@ class TableText:
     titles: list[str]
     groups: list[str]
     units: list[str]
-    width: int
     delimiter: str
     data: bytes
     rows: NDArray[np.int64]
@@ -58,21 +57,22 @@ def split_table(data: bytes, file: str) -> TableText:
         RecordError: It is no text, or has no lines.
     """
     data = _as_utf8(_unpacked(data, file), file).rstrip()
-    above = 0
-    forced = None
+    above, forced = 0, None
     header, end, rest = data.rpartition(_END_OF_HEADER)
     if end:
         _, _, data = rest.partition(b"\n")
         above = header.count(b"\n") + 1
     if match := _SEPARATOR.match(data):
         data, forced, above = data[match.end() :], match[1].decode(), above + 1
-    lines = data.split(b"\n") if _LEFT_OUT.search(data) else None
-    kept = None if lines is None else [k for k, x in enumerate(lines) if not _LEFT_OUT.match(x)]
-    if not data or kept == []:
-        raise RecordError(file, "there is no header", "a header line with the columns' titles")
-    comments = [] if lines is None or not kept else lines[: kept[-1]][:_HEAD]
-    if lines is not None and kept is not None:
+    kept = np.arange(data.count(b"\n") + 1)
+    comments: list[bytes] = []
+    if _LEFT_OUT.search(data):
+        lines = data.split(b"\n")
+        kept = np.array([k for k, x in enumerate(lines) if not _LEFT_OUT.match(x)], np.int64)
+        comments = lines[: kept[-1]][:_HEAD] if len(kept) else []
         data = b"\n".join([lines[k] for k in kept])
+    if not data:
+        raise RecordError(file, "there is no header", "a header line with the columns' titles")
     head = [line.decode() for line in data.split(b"\n", _HEAD)[:_HEAD]]
     delimiter = forced or _delimiter(head)
     cells = [_cells(line, delimiter) for line in head]
@@ -83,7 +83,7 @@ def split_table(data: bytes, file: str) -> TableText:
     titles, groups, units, used = _titles(cells[:begin], width)
     if not titles:
         marked = [_cells(_MARK.sub("", line.decode()), delimiter) for line in comments]
-        begins = kept[begin] if kept is not None and begin < len(kept) else len(marked)
+        begins = kept[begin] if begin < len(kept) else len(marked)
         matching = [line for line in marked[:begins] if len(line) == width and width > 1]
         titles = matching[-1] if matching else []
     if begin == len(cells) and used == 0:
@@ -91,17 +91,9 @@ def split_table(data: bytes, file: str) -> TableText:
     body = data.split(b"\n", begin)[begin] if data.count(b"\n") >= begin else b""
     if delimiter == " ":
         body = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+", b"", body))
-    count = body.count(b"\n") + 1 if body else 0
-    numbers = np.arange(begin, begin + count) if kept is None else np.array(kept[begin:], np.int64)
-    return TableText(
-        titles,
-        groups,
-        units,
-        max(width, len(titles)),
-        "\t" if delimiter == " " else delimiter,
-        body,
-        numbers.astype(np.int64) + 1 + above,
-    )
+    titles = titles + [str(k + 1) for k in range(len(titles), width)]
+    delimiter = "\t" if delimiter == " " else delimiter
+    return TableText(titles, groups, units, delimiter, body, kept[begin:] + 1 + above)
 
 
 def _check_decimal_commas(above: list[list[str]], data: list[list[str]], file: str) -> None:
@@ -181,12 +173,11 @@ def _unpacked(data: bytes, file: str) -> bytes:
 
 def _as_utf8(data: bytes, file: str) -> bytes:
     allowed = "a CSV file, also as .gz, or a Parquet, .npz or .mat file"
-    for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-        if data.startswith(mark):
-            try:
-                data = data.decode(encoding).encode()
-            except UnicodeDecodeError as error:
-                raise RecordError(file, str(error), allowed) from None
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        try:
+            data = data.decode("utf-16").encode()
+        except UnicodeDecodeError as error:
+            raise RecordError(file, str(error), allowed) from None
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\0" in data:
         raise RecordError(file, "a zero byte", allowed)

@@ -18,14 +18,12 @@ from tautscope.errors import MissingPathError, RecordError
 from tautscope.extras import require_module
 from tautscope.runs import bags
 from tautscope.runs.array_files import first_line, read_arrays, with_single_numbers
-from tautscope.runs.pose_columns import find_axes, title_of, travel, turn
+from tautscope.runs.pose_columns import Floats, find_axes, title_of, travel, turn
 from tautscope.runs.table_text import split_table
 from tautscope.runs.units import check_unit, split_unit
 
 if TYPE_CHECKING:
     import polars as pl
-
-Floats = NDArray[np.float64]
 
 STDIN = "-"
 _POINT = re.compile("/(position|translation|point)/[xyz]$")
@@ -76,7 +74,7 @@ class Sheet:
 
     def read(self, names: Sequence[str]) -> Table:
         """The columns with these titles, see `read_table`."""
-        columns, units, starts = {}, {}, {}
+        columns, units, starts, asked = {}, {}, {}, []
         for name in names:
             index = self.index(name)
             title = self.titles[index]
@@ -85,13 +83,14 @@ class Sheet:
             starts[name] = start or 0
             if unit := self.unit(index) if start is None else "s":
                 units[name] = unit
-        if not self.is_merged:
-            return Table(columns, units, starts, self.rows)
-        asked = [self.index(name) for name in names]
-        signals = [k for k in asked if self.titles[k] != bags.TIME] or asked
-        is_own = np.any([self.frame.to_series(k).is_not_null() for k in signals], axis=0)
-        kept = {name: values[is_own] for name, values in columns.items()}
-        return Table(kept, units, starts, self.rows[is_own])
+            asked.append(index)
+        rows = self.rows
+        if self.is_merged:
+            signals = [k for k in asked if self.titles[k] != bags.TIME] or asked
+            is_own = np.any([self.frame.to_series(k).is_not_null() for k in signals], axis=0)
+            columns = {name: values[is_own] for name, values in columns.items()}
+            rows = rows[is_own]
+        return Table(columns, units, starts, rows)
 
     def values(self, index: int, name: str) -> tuple[Floats, int | None]:
         """(n,) numbers of a column, and the date or time of day [ns] from which they count."""
@@ -160,14 +159,10 @@ def with_axes(sheet: Sheet) -> Sheet:
             values = np.stack([sheet.values(k, sheet.titles[k])[0] for k in columns], axis=1)
         except RecordError:
             continue
-        if len(columns) == 4:
-            title, found = f"{title_of(prefix, 'turn')} [rad]", turn(values)
-        else:
-            unit = sheet.unit(columns[0])
-            title, found = (
-                title_of(prefix, "travel") + (f" [{unit}]" if unit else ""),
-                travel(values),
-            )
+        is_turn = len(columns) == 4
+        found = turn(values) if is_turn else travel(values)
+        unit = "rad" if is_turn else sheet.unit(columns[0])
+        title = title_of(prefix, "turn" if is_turn else "travel") + (f" [{unit}]" if unit else "")
         if found is not None and title not in (*sheet.titles, *(each.name for each in added)):
             added.append(pl.Series(title, found, nan_to_null=True))
     titles = [*sheet.titles, *(each.name for each in added)]
@@ -197,7 +192,7 @@ def _open(path: str | PathLike[str], what: str) -> Sheet:
                 count = f"{frame['episode_index'].n_unique()} episodes"
                 raise RecordError(file, count, "one: give the data set's folder")
         else:
-            head = text.delimiter.join(map(str, range(text.width))).encode()
+            head = text.delimiter.join(map(str, range(len(text.titles)))).encode()
             frame = pl.read_csv(
                 head + b"\n" + text.data,
                 separator=text.delimiter,
@@ -209,11 +204,10 @@ def _open(path: str | PathLike[str], what: str) -> Sheet:
         raise RecordError(file, first_line(error), kind) from None
     if text is None:
         return Sheet(file, frame, frame.columns, [], [], np.arange(1, len(frame) + 1), "row")
-    titles = text.titles + [str(k + 1) for k in range(len(text.titles), text.width)]
     rows = text.rows
     if len(rows) != len(frame):  # cells of several lines
         rows = np.arange(len(frame)) + (rows[0] if len(rows) else 1)
-    return Sheet(file, frame, titles, text.groups, text.units, rows, "line")
+    return Sheet(file, frame, text.titles, text.groups, text.units, rows, "line")
 
 
 def filled(values: Floats) -> Floats:

@@ -8,13 +8,7 @@ from tautscope.dof import Dof
 from tautscope.errors import FieldError, RecordError
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "in": 0.0254}
-ANGLES = {
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "deg": math.pi / 180,
-    "°": math.pi / 180,
-    "rev": 2 * math.pi,
-}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi}
 TIMES = {
     "s": 1.0,
     "sec": 1.0,

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope._core import track_coefficients
 from tautscope.analysis.models import constant_play, prandtl_ishlinskii
 from tautscope.analysis.models.task import Floats, continued, fit_samples
-from tautscope.analysis.models.tracked_regression import track
 
 RADII = 0.5 * (np.arange(12) / 12) ** 1.5
 """Radii of the plays; small ones are closer to each other."""
@@ -25,6 +25,8 @@ tips determine; and of the scale of a fitted model."""
 WALKS = np.array([(d, w) for d in (0.003, 0.03, 0.3) for w in (0.0, 0.1)])
 REFIT_WALKS = np.array([(d, 0.0) for d in (0.003, 0.01, 0.03, 0.1, 0.3)])
 """Random walks of disturbance and coefficients, see `track`."""
+NOISE, UNKNOWN = 1e-3, 10.0
+"""Standard deviation of a measured tip, and prior one of the disturbance."""
 FIRST_FIT, GROWTH = 8, 1.25
 """Measured tips of the first fit, and factor to the next."""
 Fitted = constant_play.ConstantPlay | prandtl_ishlinskii.PrandtlIshlinskii
@@ -91,34 +93,25 @@ def adaptive_operator(signals: Signals) -> Component:
     """
     plain = prandtl_ishlinskii.operators(signals.command, tuple(RADII.tolist()))
     bent = [np.maximum(plain[:, ::2] - knot, 0) for knot in KNOTS]
-    predicted = track(
-        np.column_stack([plain, *bent]),
-        signals.travel,
-        signals.measured,
-        spread=SPREAD,
-        walks=WALKS,
-    )
+    features = np.column_stack([plain, *bent])
+    predicted = track(features, signals.travel, signals.measured, spread=SPREAD, walks=WALKS)
     return Component("adaptive_bent_plays", predicted)
 
 
 def refitted_models(signals: Signals) -> Iterator[Component]:
     """A constant play and a Prandtl-Ishlinskii operator, fitted to all past tips ever again."""
-    yield _refitted(
-        "refitted_play",
-        signals,
-        lambda command, measured: (constant_play.fit(command, measured), 4),
-    )
-    yield _refitted("refitted_prandtl_ishlinskii", signals, _fit_prandtl_ishlinskii)
+    yield _refitted("refitted_play", signals, constant_play.fit)
+    yield _refitted("refitted_prandtl_ishlinskii", signals, prandtl_ishlinskii.fit)
 
 
-def _fit_prandtl_ishlinskii(command: Floats, measured: Floats) -> tuple[Fitted, int]:
-    found = prandtl_ishlinskii.fit(command, measured)
-    return found, 1 + sum(weight > 0 for weight in found.weights)
+def _parameters(model: Fitted) -> int:
+    """Number of parameters that were fitted; weights of 0 do not count."""
+    if isinstance(model, constant_play.ConstantPlay):
+        return 4
+    return 1 + sum(weight > 0 for weight in model.weights)
 
 
-def _refitted(
-    name: str, signals: Signals, fit: Callable[[Floats, Floats], tuple[Fitted, int]]
-) -> Component:
+def _refitted(name: str, signals: Signals, fit: Callable[[Floats, Floats], Fitted]) -> Component:
     """A model that is fitted to all tips so far whenever their number has grown by `GROWTH`.
 
     Variants: its output; its output with a scale and a disturbance that are tracked; and its change
@@ -136,16 +129,13 @@ def _refitted(
         begin = at[count - 1] + 1
         end = at[following - 1] + 1 if following < len(at) else len(command)
         past = command[:begin]
-        model, parameters = fit(past, measured[:begin])
+        model = fit(past, measured[:begin])
+        parameters = _parameters(model)
         output = model.predict(command[:end])
-        tracked = track(
-            (output - output[:begin].mean())[:, None],
-            signals.travel[:end],
-            measured[:end],
-            spread=REFIT_SPREAD,
-            walks=REFIT_WALKS,
-        )
-        found = np.column_stack([output, tracked, continued(output, measured[:end])])
+        centred, travel = output - output[:begin].mean(), signals.travel[:end]
+        tips = measured[:end]
+        tracked = track(centred[:, None], travel, tips, spread=REFIT_SPREAD, walks=REFIT_WALKS)
+        found = np.column_stack([output, tracked, continued(output, tips)])
         predicted[begin:end] = found[begin:end]
         forgotten = int(np.argmax(fit_samples(past, measured[:begin])[at[:count]]))
         used = count - forgotten
@@ -154,3 +144,38 @@ def _refitted(
         refits.append(Refit(count, forgotten, np.nan_to_num(errors) * np.sqrt(inflation)))
         count = following
     return Component(name, predicted, refits)
+
+
+def track(
+    features: Floats, travel: Floats, tips: Floats, *, spread: float, walks: Floats
+) -> Floats:
+    """Predict the tip by linear regressions whose coefficients Kalman filters track.
+
+        y_k = f_k^T w_k + d_k + v_k,   v_k ~ N(0, NOISE^2)
+        w, d: random walks in the travel of the command
+
+    f are the features, w their coefficients, d the disturbance: what the features do not explain.
+
+    Args:
+        features: (n, m).
+        travel: (n,) travel of the command since the start.
+        tips: (n,) the tip, NaN where it was not measured.
+        spread: Prior standard deviation of each coefficient; the prior mean of the first is 1, that
+            of the others 0.
+        walks: (k, 2) standard deviation after a travel of 1 of disturbance and coefficients, the
+            latter as a share of `spread`; one row per filter.
+
+    Returns:
+        (n, k) predicted tip; NaN up to the first measured tip. Sample j uses the tips before j.
+    """
+    samples, size = features.shape
+    coefficients = (walks[:, 1:] * spread) ** 2
+    return track_coefficients(
+        np.column_stack([features, np.ones(samples)]),
+        travel,
+        tips,
+        mean=np.arange(size + 1) == 0,
+        variance=np.append(np.full(size, spread**2), UNKNOWN**2),
+        growth=np.column_stack([np.repeat(coefficients, size, axis=1), walks[:, :1] ** 2]),
+        noise=NOISE,
+    )

@@ -83,12 +83,8 @@ def mix(components: list[Component], signals: Signals) -> tuple[Floats, dict[str
     weights = np.full((1, len(MEMORIES), errors.shape[1]), 1 / errors.shape[1])
     samples = len(signals.command)
     predicted, shares = np.full(samples, np.nan), np.full((samples, len(components)), np.nan)
-    bounds = {
-        1,
-        *fits,
-        *range(BLOCK, len(tips), BLOCK),
-        len(tips),
-    }  # nothing predicts the first tip
+    # From 1 on: nothing predicts the first tip.
+    bounds = {1, *fits, *range(BLOCK, len(tips), BLOCK), len(tips)}
     for begin, end in pairwise(sorted(bounds)):
         block = errors[begin:end].copy()
         found = _discounted(_terms(block), discounts, sums)

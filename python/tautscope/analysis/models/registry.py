@@ -49,11 +49,7 @@ MODELS = (
         "paper", "article's estimator", "on-line", partial(online.predict, make=online.paper), True
     ),
     Model(
-        "filter",
-        "fixed plays",
-        "on-line",
-        partial(online.predict, make=online.fixed_plays),
-        True,
+        "filter", "fixed plays", "on-line", partial(online.predict, make=online.fixed_plays), True
     ),
     Model("best", "weighted mixture", "on-line", mixture.run, True),
 )
