@@ -8,14 +8,14 @@ events as JSON lines, and ends with its input, as ``tautscope bench``.
 import argparse
 import json
 import time
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
-from tautscope.bench.events import EventPrinter
+from tautscope.bench.events import print_events
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
 from tautscope.bench.motors import OnCycle, SimulatedMotors
 from tautscope.bench.requests import raise_errors_of_threads, serve_requests
@@ -34,14 +34,10 @@ def make_motors(
     start: NDArray[np.float64],
     modes: tuple[int, ...] = (7, 8),
 ) -> SimulatedMotors:
-    """The motors of a configuration, not yet running.
+    """The motors of a configuration, not yet running; `resources` closes their bus.
 
-    Args:
-        config: ``channel`` names the socket of the bus, or the link to the pseudo-terminal.
-        resources: Closes the bus.
-        on_cycle: The plant; without it, the motors follow ideally.
-        start: Positions (n,) [m or rad].
-        modes: Supported modes of operation of CiA 402 drives.
+    ``drives.channel`` names the socket of the bus, or the link to the pseudo-terminal. The others
+    are arguments of `SimulatedMotors` and `SimulatedDrives`.
 
     Raises:
         ConfigError: The configuration does not describe a bench, or a socket cannot be made.
@@ -81,7 +77,7 @@ def main() -> None:
         make_motors(config, resources, start=start, modes=tuple(arguments.modes)) as motors,
     ):
         print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
-        with closing(EventPrinter(lambda: motors.events)):
+        with print_events(lambda: motors.events):
             serve_requests(motors.request)
 
 

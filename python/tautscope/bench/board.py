@@ -10,7 +10,6 @@ from tautscope.twin.board import BoardCamera, random_poses
 POSE_PERIOD = 1.0
 """How long the board is held in a pose [s]."""
 _POSES = 60
-"""Number of different poses."""
 
 
 class MovedBoard:

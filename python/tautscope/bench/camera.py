@@ -38,18 +38,16 @@ _QUEUE_LENGTH = 4
 """Captures that can wait to be rendered; further ones are dropped."""
 _SEND_TIMEOUT = 0.5
 """How long a client may take to read an image [s] before it is disconnected."""
+_DELAY = 0.3
+"""By how much images of the fault ``delay`` are later [s]."""
 _POLL_PERIOD = 0.02
 """How often the thread checks for clients and faults [s]."""
 
 
 class CameraStream:
-    """A thread that renders, delays and sends images to one client at a time.
+    """A thread that renders, delays and sends images to one client of a socket at a time.
 
-    Args:
-        config: Camera, instrument, twin.
-        path: Path of the socket.
-        centreline_now: The present centreline, for images while nobody calls `capture`.
-        timing: Random generator of the latencies.
+    `centreline_now` is for images while nobody calls `capture`, `timing` draws the latencies.
     """
 
     def __init__(
@@ -69,7 +67,7 @@ class CameraStream:
         self._pending: deque[tuple[float, float, NDArray[np.uint8]]] = deque()
         self._due = time.monotonic()
         self._sequence = 0
-        self._faults: dict[str, float] = {}
+        self._faults: set[str] = set()
         self._frozen_image: NDArray[np.uint8] | None = None
         self._board: MovedBoard | None = None
         self._server: socket.socket | None = None
@@ -88,15 +86,15 @@ class CameraStream:
         with suppress(queue.Full):
             self._captures.put_nowait((at, centreline))
 
-    def inject(self, kind: str, delay: float = 0.3) -> None:
-        """Inject a fault; `delay` [s] applies to the kind ``delay``; ``clear`` ends all faults.
+    def inject(self, kind: str) -> None:
+        """Inject a fault; ``clear`` ends all faults.
 
         Raises:
             ConfigError: There is no such fault.
         """
         if kind not in ("clear", *FAULTS):
             raise ConfigError("fault", kind, "one of " + ", ".join(FAULTS))
-        self._faults = {} if kind == "clear" else self._faults | {kind: delay}
+        self._faults = set() if kind == "clear" else self._faults | {kind}
 
     def __enter__(self) -> Self:
         try:
@@ -150,7 +148,7 @@ class CameraStream:
             self._frozen_image = None
         if "drop" not in faults:
             stamp = at + twin.sensor.stamp_error
-            due = max(at, stamp) + delay + faults.get("delay", 0.0)
+            due = max(at, stamp) + delay + (_DELAY if "delay" in faults else 0.0)
             self._pending.append((due, stamp, image))
 
     def _listen(self) -> socket.socket:
@@ -197,8 +195,6 @@ class CameraStream:
 
 
 class _Client:
-    """A connection with its own NUT stream."""
-
     def __init__(self, connection: socket.socket, config: Config) -> None:
         connection.settimeout(_SEND_TIMEOUT)
         self._connection = connection

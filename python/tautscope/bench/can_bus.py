@@ -52,11 +52,7 @@ class LocalBus(can.BusABC):
         super().__init__(channel=channel, **options)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Send a frame.
-
-        Raises:
-            can.CanOperationError: The hub is closed.
-        """
+        """Send a frame; `can.CanOperationError` if the hub is closed."""
         identifier = msg.arbitration_id
         identifier |= EXTENDED if msg.is_extended_id else 0
         identifier |= REMOTE if msg.is_remote_frame else 0
@@ -105,8 +101,7 @@ class LocalBus(can.BusABC):
 class Hub:
     """The bus between stations: a thread that forwards frames.
 
-    Args:
-        path: Path of its socket; the socket of a hub that has ended is replaced.
+    Its socket replaces that of a hub that has ended.
 
     Raises:
         OSError: The socket cannot be made, or a running hub uses it.

@@ -6,7 +6,7 @@ no clock: the caller passes frames and the time.
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from tautscope.hardware.object_dictionary import Entry, device_profile
 
@@ -33,15 +33,12 @@ Send = Callable[[int, bytes], None]
 
 
 class CanopenNode:
-    """One CANopen device.
+    """One CANopen device, without the objects of the indices `absent`.
 
-    Args:
-        node: Node id.
-        send: Called with identifier and data of each frame it sends.
-        absent: Indices of objects it lacks.
+    `send` is called with identifier and data of each frame.
     """
 
-    def __init__(self, node: int, send: Send, absent: frozenset[int] = frozenset()) -> None:
+    def __init__(self, node: int, send: Send, absent: Collection[int] = ()) -> None:
         self.node = node
         self.entries: dict[Key, Entry] = {
             (entry.index, entry.subindex): entry
@@ -74,7 +71,7 @@ class CanopenNode:
         if now >= self.heartbeat_deadline:
             self.heartbeat_deadline = math.inf
             self.emergency(HEARTBEAT_LOST, 0x11)
-            self.on_heartbeat_lost(now)
+            self.on_connection_lost(now)
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Handle a frame from the bus."""
@@ -118,30 +115,25 @@ class CanopenNode:
     def on_sync(self, now: float) -> None:
         """Handle SYNC."""
 
-    def on_heartbeat_lost(self, now: float) -> None:
-        """Handle a missing heartbeat of the master."""
-
-    def on_stopped(self, now: float) -> None:
-        """Handle the NMT transition out of operational."""
+    def on_connection_lost(self, now: float) -> None:
+        """Handle a missing heartbeat of the master, or the NMT transition out of operational."""
 
     # CiA 301
 
     def _nmt(self, command: int, now: float) -> None:
         if command in NMT_RESETS:
-            self.on_stopped(now)
+            self.on_connection_lost(now)
             self.boot(now)
         elif command in NMT_COMMANDS:
             was, self.state = self.state, NMT_COMMANDS[command]
             if was == OPERATIONAL != self.state:
-                self.on_stopped(now)
+                self.on_connection_lost(now)
 
     def _is_valid(self, base: int) -> bool:
         return not self.values[base, 1] & INVALID
 
     def _mapped(self, mapping: int) -> list[Key]:
-        count = self.values[mapping, 0]
-        packed = [self.values[mapping, sub] for sub in range(1, count + 1)]
-        return [(value >> 16, value >> 8 & 0xFF) for value in packed]
+        return [_key(self.values[mapping, sub]) for sub in range(1, self.values[mapping, 0] + 1)]
 
     def _unpack(self, base: int, data: bytes, now: float) -> None:
         start = 0
@@ -191,19 +183,21 @@ class CanopenNode:
             if self._is_valid(index - 0x200) or (subindex and self.values[index, 0]):
                 return WRONG_STATE
             if not subindex:
-                keys = [
-                    (packed >> 16, packed >> 8 & 0xFF)
-                    for packed in (self.values.get((index, sub), 0) for sub in range(1, value + 1))
-                ]
+                keys = [_key(self.values.get((index, sub), 0)) for sub in range(1, value + 1)]
                 if any(mapped not in self.entries for mapped in keys):
                     return NO_OBJECT
                 if sum(self.entries[mapped].size for mapped in keys) > 8:
                     return TOO_LONG_FOR_PDO
             else:
-                mapped = self.entries.get((value >> 16, value >> 8 & 0xFF))
+                mapped = self.entries.get(_key(value))
                 if mapped is None or not mapped.mappable or mapped.mapping != value:
                     return NOT_MAPPABLE
         return None
+
+
+def _key(mapping: int) -> Key:
+    """Index and sub-index in an entry of a PDO mapping."""
+    return mapping >> 16, mapping >> 8 & 0xFF
 
 
 def _abort(key: Key, code: int) -> bytes:

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from tautscope.bench.canopen_node import OUT_OF_RANGE, CanopenNode, Key, Send
 from tautscope.config import DrivesConfig
@@ -18,6 +18,8 @@ _STATUSWORD = {
     State.QUICK_STOP_ACTIVE: 0x0217,
     State.FAULT: 0x0208,
 }
+_CONNECTION_LOST = {1: State.FAULT, 2: State.SWITCH_ON_DISABLED, 3: State.QUICK_STOP_ACTIVE}
+"""0x6007 -> state after a lost connection; else the drive ignores it."""
 OVERHEATED = 0x4310
 """Emergency code: excess temperature of the drive."""
 SERIAL_NUMBERS = 0x7A00_0000
@@ -27,13 +29,8 @@ SERIAL_NUMBERS = 0x7A00_0000
 class SimulatedDrive(CanopenNode):
     """A drive with the CiA 402 state machine, modes 7 and 8, limits and quick stop.
 
-    Args:
-        dof: DOF of its motor.
-        config: The true rig.
-        send: See `CanopenNode`.
-        log: Called with the time and the event.
-        modes: Supported modes of operation.
-        absent: See `CanopenNode`.
+    `config` is the true rig, `modes` are those of operation that it supports; `log` is called with
+    the time and the event.
     """
 
     def __init__(
@@ -43,8 +40,8 @@ class SimulatedDrive(CanopenNode):
         send: Send,
         log: Callable[[float, str], None],
         *,
-        modes: frozenset[int],
-        absent: frozenset[int] = frozenset(),
+        modes: Collection[int],
+        absent: Collection[int] = (),
     ) -> None:
         super().__init__(config[dof].node, send, absent)
         self.cycle = config.cycle
@@ -102,21 +99,11 @@ class SimulatedDrive(CanopenNode):
         elif self.status is State.QUICK_STOP_ACTIVE and self.values[0x605A, 0] == 2:
             self._enter(State.SWITCH_ON_DISABLED, now)
 
-    def on_heartbeat_lost(self, now: float) -> None:
-        """React as set in 0x6007: 1 fault, 2 disable voltage, 3 quick stop."""
-        if self.status is not State.OPERATION_ENABLED:
-            return
-        reaction = self.values.get((0x6007, 0), 0)
-        if reaction == 1:
-            self._enter(State.FAULT, now)
-        elif reaction == 2:
-            self._enter(State.SWITCH_ON_DISABLED, now)
-        elif reaction == 3:
-            self._enter(State.QUICK_STOP_ACTIVE, now)
-
-    def on_stopped(self, now: float) -> None:
-        """React to the end of operational as to a lost connection."""
-        self.on_heartbeat_lost(now)
+    def on_connection_lost(self, now: float) -> None:
+        """React as set in 0x6007."""
+        target = _CONNECTION_LOST.get(self.values.get((0x6007, 0), 0))
+        if self.status is State.OPERATION_ENABLED and target is not None:
+            self._enter(target, now)
 
     def _control(self, word: int, now: float) -> None:
         """Apply a controlword: bits 7, 3, 2, 1, 0 of the command table of CiA 402."""

@@ -3,8 +3,6 @@
 with Hub(path), LocalBus(path) as bus, SimulatedDrives(bus, truth, plant) as drives: ...
 """
 
-import heapq
-import itertools
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -22,17 +20,14 @@ from tautscope.hardware.cia402 import State
 
 
 class SimulatedDrives(SimulatedMotors):
-    """Drives on one bus.
+    """Drives on one bus, which stays open.
 
     Their faults: drop: neither sends nor receives. delay: sends late. fault: emergency object and
     fault state. freeze: the position does not change. heartbeat: sends no heartbeats. refuse:
     accepts no mode of operation.
 
-    Args:
-        bus: The bus; it stays open.
-        config, on_cycle, start: As of `SimulatedMotors`.
-        modes: Supported modes of operation; (7,) as the article's drives.
-        absent: Indices of objects that they lack.
+    `modes` are the supported modes of operation, (7,) as the article's drives; `absent` the indices
+    of objects that they lack.
     """
 
     kinds = ("drop", "delay", "fault", "freeze", "heartbeat", "refuse")
@@ -47,23 +42,21 @@ class SimulatedDrives(SimulatedMotors):
         modes: tuple[int, ...] = (7, 8),
         absent: tuple[int, ...] = (),
     ) -> None:
-        super().__init__(config, on_cycle, start)
+        super().__init__(config, on_cycle, start=start)
         self._bus = bus
-        self._delayed: list[tuple[float, int, can.Message]] = []
-        self._order = itertools.count()
         self._drives = [
             SimulatedDrive(
                 dof,
                 config,
                 partial(self._send, dof),
                 partial(self._log, dof),
-                modes=frozenset(modes),
-                absent=frozenset(absent),
+                modes=modes,
+                absent=absent,
             )
             for dof in config.all_motors
         ]
-        for drive, scale, position in zip(self._drives, self._scales, self._start, strict=True):
-            drive.values[0x6064, 0] = scale.to_counts(float(position))
+        for drive, position in zip(self._drives, self._start, strict=True):
+            drive.values[0x6064, 0] = position
         self._is_disconnected = False
 
     @property
@@ -76,9 +69,7 @@ class SimulatedDrives(SimulatedMotors):
             drive.boot(time.monotonic())
 
     def _process_next(self) -> None:
-        due = min(drive.deadline() for drive in self._drives)
-        if self._delayed:
-            due = min(due, self._delayed[0][0])
+        due = min(self._queued_at(), *(drive.deadline() for drive in self._drives))
         message = self._receive(min(max(due - time.monotonic(), 0.0), 0.05))
         now = time.monotonic()
         self._apply_requests(now)
@@ -91,8 +82,7 @@ class SimulatedDrives(SimulatedMotors):
                 self._step_plant()
         for drive in self._drives:
             drive.tick(now)
-        while self._delayed and self._delayed[0][0] <= now:
-            self._transmit(heapq.heappop(self._delayed)[2])
+        self._transmit_queued()
 
     def _receive(self, timeout: float) -> can.Message | None:
         """Receive a frame within `timeout` [s]; without a bus the drives run on."""
@@ -114,16 +104,11 @@ class SimulatedDrives(SimulatedMotors):
     def _step_plant(self) -> None:
         if not any(drive.state == OPERATIONAL for drive in self._drives):
             return
-        demand = np.array(
-            [
-                scale.to_position(drive.demand)
-                for scale, drive in zip(self._scales, self._drives, strict=True)
-            ]
-        )
-        actual = demand if self._on_cycle is None else self._on_cycle(demand)
+        demand = self._to_positions(drive.demand for drive in self._drives)
+        actual = self._to_counts(demand if self._on_cycle is None else self._on_cycle(demand))
         for dof, faults in self._faults.items():
             if "freeze" not in faults:
-                self._drives[dof].set_position(self._scales[dof].to_counts(float(actual[dof])))
+                self._drives[dof].set_position(actual[dof])
 
     def _apply(self, kind: str, dof: Motor, now: float) -> None:
         drive = self._drives[dof]
@@ -142,7 +127,6 @@ class SimulatedDrives(SimulatedMotors):
             return
         message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         if "delay" in faults:
-            due = time.monotonic() + faults["delay"]
-            heapq.heappush(self._delayed, (due, next(self._order), message))
+            self._queue(time.monotonic() + faults["delay"], message)
         else:
             self._transmit(message)

@@ -2,7 +2,8 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
 
 from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
@@ -23,40 +24,35 @@ class Event:
     what: str
 
 
-class Repeater:
-    """A thread that works every `period` [s], and once more when it is closed."""
+@contextmanager
+def repeating(work: Callable[[], None], period: float) -> Iterator[None]:
+    """Work in a thread every `period` [s], and once more at the end of the block."""
+    stopping = threading.Event()
 
-    def __init__(self, work: Callable[[], None], period: float) -> None:
-        self._work, self._period = work, period
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Work once more and end."""
-        self._stopping.set()
-        self._thread.join()
-
-    def _run(self) -> None:
+    def run() -> None:
         lower_realtime_priority(OTHERS)
         is_last = False
         while not is_last:
-            is_last = self._stopping.wait(self._period)
-            self._work()
+            is_last = stopping.wait(period)
+            work()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stopping.set()
+        thread.join()
 
 
-class EventPrinter(Repeater):
-    """A thread that prints each event as a JSON line.
+def print_events(events: Callable[[], list[Event]]) -> AbstractContextManager[None]:
+    """Print each event as a JSON line, in a thread; `events` returns all so far."""
+    printed = 0
 
-    Args:
-        events: Returns all events so far.
-    """
-
-    def __init__(self, events: Callable[[], list[Event]]) -> None:
-        self._events, self._count = events, 0
-        super().__init__(self._print, 0.02)
-
-    def _print(self) -> None:
-        for event in self._events()[self._count :]:
-            self._count += 1
+    def work() -> None:
+        nonlocal printed
+        for event in events()[printed:]:
+            printed += 1
             print(json.dumps(asdict(event)), flush=True)
+
+    return repeating(work, 0.02)

@@ -5,8 +5,6 @@ clock when no client cycles.
 """
 
 import fcntl
-import heapq
-import itertools
 import math
 import os
 import select
@@ -14,12 +12,13 @@ import struct
 import time
 import tty
 from abc import abstractmethod
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tautscope.bench.motors import OnCycle, SimulatedMotors
+from tautscope.bench.motors import SimulatedMotors
 from tautscope.config import DrivesConfig
 from tautscope.errors import ConfigError
 
@@ -33,28 +32,20 @@ _TCGETS2 = 0x802C542A
 class LineMotors(SimulatedMotors):
     """Motors on one line, which the `stops` of their configuration stop.
 
-    Args:
-        config: The true rig; ``channel`` becomes a link to the pseudo-terminal.
-        on_cycle, start: As of `SimulatedMotors`.
+    ``drives.channel`` becomes a link to the pseudo-terminal.
 
     Raises:
         ConfigError: The link cannot be made.
     """
 
-    def __init__(
-        self,
-        config: DrivesConfig,
-        on_cycle: OnCycle | None = None,
-        *,
-        start: NDArray[np.float64] | None = None,
-    ) -> None:
-        super().__init__(config, on_cycle, start)
+    kinds = ("drop", "delay", "fault", "freeze", "restart", "unplug")
+
+    def __init__(self, config: DrivesConfig, *arguments: Any, **options: Any) -> None:
+        super().__init__(config, *arguments, **options)
         stops = [config[dof].stops or (-math.inf, math.inf) for dof in config.all_motors]
         self._lowest, self._highest = np.transpose(stops)
         self._has_goals = False
         self._buffer = bytearray()
-        self._answers: list[tuple[float, int, bytes]] = []
-        self._order = itertools.count()
         self._stepped_at = 0.0
         self._link = Path(config.channel)
         self._line = self._open()
@@ -69,26 +60,19 @@ class LineMotors(SimulatedMotors):
 
     @abstractmethod
     def _process(self, now: float) -> None:
-        """Take what is complete in `_buffer`, and `_queue` the answers.
-
-        A cycle of the client sets `_has_goals`.
-        """
+        """Take what is complete in `_buffer`, `_queue` the answers, set `_has_goals` if cycled."""
 
     @abstractmethod
-    def _advance(self, period: float, now: float) -> list[float]:
-        """Advance the position loops by a period [s]; the demanded positions [m or rad]."""
+    def _advance(self, period: float, now: float) -> list[int]:
+        """Advance the position loops by a period [s]; the demanded positions [counts]."""
 
     @abstractmethod
-    def _move(self, positions: NDArray[np.float64]) -> None:
-        """Take note of the positions that the plant has reached (n,) [m or rad]."""
+    def _move(self, shafts: list[int]) -> None:
+        """Take note of the positions that the plant has reached [counts]."""
 
     def _due(self) -> float:
         """When something must happen without a byte from the client [s]."""
         return math.inf
-
-    def _queue(self, at: float, data: bytes) -> None:
-        """Send data at a time [s]."""
-        heapq.heappush(self._answers, (at, next(self._order), data))
 
     def _wire_time(self, size: int) -> float:
         """How long so many bytes take on the line [s]."""
@@ -121,16 +105,13 @@ class LineMotors(SimulatedMotors):
         self._stepped_at = time.monotonic()
 
     def _process_next(self) -> None:
-        due = min(self._stepped_at + 1.5 * self._config.cycle, self._due())
-        if self._answers:
-            due = min(due, self._answers[0][0])
+        due = min(self._stepped_at + 1.5 * self._config.cycle, self._due(), self._queued_at())
         self._receive(max(0.0, due - time.monotonic()))
         now = time.monotonic()
         self._apply_requests(now)
         self._process(now)
-        while self._answers and self._answers[0][0] <= time.monotonic():
-            self._send(heapq.heappop(self._answers)[2])
-        has_cycled = self._has_goals and not self._answers
+        self._transmit_queued()
+        has_cycled = self._has_goals and not self._queued
         if has_cycled or now >= self._stepped_at + 1.5 * self._config.cycle:
             self._step(now, has_cycled=has_cycled)
 
@@ -158,11 +139,9 @@ class LineMotors(SimulatedMotors):
         settings = fcntl.ioctl(self._line, _TCGETS2, bytes(44))
         return int(struct.unpack("4IB19s2I", settings)[-1])
 
-    def _send(self, data: bytes) -> None:
-        try:
+    def _transmit(self, data: bytes) -> None:
+        with suppress(OSError):  # the client is gone
             os.write(self._line, data)
-        except OSError:
-            return  # the client is gone
 
     def _step(self, now: float, *, has_cycled: bool) -> None:
         # Without a client's cycles the clock counts, and a late step does not move the grid.
@@ -170,5 +149,6 @@ class LineMotors(SimulatedMotors):
         if now - self._stepped_at > 1.0:
             self._stepped_at = now
         self._has_goals = False
-        demand = np.clip(self._advance(self._config.cycle, now), self._lowest, self._highest)
-        self._move(demand if self._on_cycle is None else self._on_cycle(demand))
+        demand = self._to_positions(self._advance(self._config.cycle, now))
+        demand = np.clip(demand, self._lowest, self._highest)
+        self._move(self._to_counts(demand if self._on_cycle is None else self._on_cycle(demand)))

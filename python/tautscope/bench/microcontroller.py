@@ -6,9 +6,6 @@ with SimulatedMicrocontroller(config, plant): ...  # a client opens drives.chann
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tautscope.bench.line_motors import LineMotors
 from tautscope.bench.serial_board import SerialBoard
 from tautscope.config import DrivesConfig
@@ -28,23 +25,15 @@ class SimulatedMicrocontroller(LineMotors):
     restarts, and counts from where the motors are then. unplug: the adapter is gone.
     """
 
-    kinds = ("drop", "delay", "fault", "freeze", "restart", "unplug")
-
     def __init__(self, config: DrivesConfig, *arguments: Any, **options: Any) -> None:
         super().__init__(config, *arguments, **options)
         self._at = [config[dof].node - 1 for dof in config.all_motors]
-        self.shafts = [
-            scale.to_counts(float(shaft))
-            for scale, shaft in zip(self._scales, self._start, strict=True)
-        ]
+        self.shafts = list(self._start)
         """Where the motors are [counts from home]."""
         self._blocked: set[Motor] = set()
-        speeds = {
-            at: scale.speed_counts() for at, scale in zip(self._at, self._scales, strict=True)
-        }
-        self._limits = [
-            Limits(-_LIMIT, _LIMIT, speeds.get(at, 0)) for at in range(max(self._at) + 1)
-        ]
+        self._limits = [Limits(-_LIMIT, _LIMIT, 0)] * (max(self._at) + 1)
+        for at, scale in zip(self._at, self._scales, strict=True):
+            self._limits[at] = Limits(-_LIMIT, _LIMIT, scale.speed_counts())
         self._switch_on([0] * len(self._scales))
 
     def _switch_on(self, zeros: list[int]) -> None:
@@ -77,21 +66,18 @@ class SimulatedMicrocontroller(LineMotors):
             return math.inf
         return 1e-3 * (self.board.heard_at + self.board.watchdog)
 
-    def _advance(self, period: float, now: float) -> list[float]:
+    def _advance(self, period: float, now: float) -> list[int]:
         for dof, at in enumerate(self._at):
             goal = self.board.targets[at] + self._zeros[dof]
             step = self._limits[at].speed * period
             if self.board.state == State.ENABLED:
                 self._demands[dof] += min(max(goal - self._demands[dof], -step), step)
-        return [
-            scale.to_position(round(demand))
-            for scale, demand in zip(self._scales, self._demands, strict=True)
-        ]
+        return list(map(round, self._demands))
 
-    def _move(self, positions: NDArray[np.float64]) -> None:
-        for dof, position in zip(self._config.all_motors, positions, strict=True):
+    def _move(self, shafts: list[int]) -> None:
+        for dof in self._config.all_motors:
             if dof not in self._blocked:
-                self.shafts[dof] = self._scales[dof].to_counts(float(position))
+                self.shafts[dof] = shafts[dof]
         self._publish()
 
     def _apply(self, kind: str, dof: Motor, now: float) -> None:

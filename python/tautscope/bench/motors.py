@@ -1,11 +1,14 @@
 """What all simulated motors have in common: a thread, a plant, faults on request, events."""
 
+import heapq
+import itertools
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
-from typing import ClassVar, Self
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,25 +33,26 @@ class SimulatedMotors(ABC):
         config: The true rig, which may differ from the master's configuration.
         on_cycle: The plant; without it, the motors follow ideally.
         start: (n,) positions at power-on [m or rad]; zeros by default.
-
-    Attributes:
-        kinds: The faults that they know.
     """
 
     kinds: ClassVar[tuple[str, ...]]
+    """The faults that they know."""
 
     def __init__(
         self,
         config: DrivesConfig,
-        on_cycle: OnCycle | None,
-        start: NDArray[np.float64] | None,
+        on_cycle: OnCycle | None = None,
+        *,
+        start: NDArray[np.float64] | None = None,
     ) -> None:
         self._config, self._on_cycle = config, on_cycle
         self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
-        self._start = np.zeros(len(self._scales)) if start is None else start
+        self._start = self._to_counts(np.zeros(len(self._scales)) if start is None else start)
         self._events: list[Event] = []
         self._requests: deque[tuple[str, Motor, float]] = deque()
         self._faults: dict[Motor, dict[str, float]] = {dof: {} for dof in config.all_motors}
+        self._queued: list[tuple[float, int, Any]] = []
+        self._order = itertools.count()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
 
@@ -65,11 +69,7 @@ class SimulatedMotors(ABC):
         self._requests.append((kind, dof, delay))
 
     def request(self, line: str, *, others: tuple[str, ...] = ()) -> None:
-        """Inject the fault of a line: ``freeze rotation``, ``clear rotation``.
-
-        Args:
-            line: Kind and motor.
-            others: Further parts of the bench, for the error.
+        """Inject the fault of a line, such as ``freeze rotation``; `others` are for the error.
 
         Raises:
             ConfigError: There is no such fault or motor.
@@ -115,6 +115,21 @@ class SimulatedMotors(ABC):
         """Wait for what comes next, and process it."""
 
     @abstractmethod
+    def _transmit(self, data: Any) -> None:
+        """Send what was queued."""
+
+    def _queue(self, at: float, data: Any) -> None:
+        """Send data at a time [s]."""
+        heapq.heappush(self._queued, (at, next(self._order), data))
+
+    def _queued_at(self) -> float:
+        return self._queued[0][0] if self._queued else math.inf
+
+    def _transmit_queued(self) -> None:
+        while self._queued_at() <= time.monotonic():
+            self._transmit(heapq.heappop(self._queued)[2])
+
+    @abstractmethod
     def _apply(self, kind: str, dof: Motor, now: float) -> None:
         """Begin a fault."""
 
@@ -135,3 +150,11 @@ class SimulatedMotors(ABC):
 
     def _log(self, dof: Motor, now: float, what: str) -> None:
         self._events.append(Event(now, dof.label, what))
+
+    def _to_counts(self, positions: NDArray[np.float64]) -> list[int]:
+        pairs = zip(self._scales, positions, strict=True)
+        return [scale.to_counts(float(position)) for scale, position in pairs]
+
+    def _to_positions(self, counts: Iterable[int]) -> NDArray[np.float64]:
+        pairs = zip(self._scales, counts, strict=True)
+        return np.array([scale.to_position(count) for scale, count in pairs])

@@ -34,8 +34,7 @@ class Bench:
     them.
 
     Args:
-        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) name the sockets, or
-            the link to the pseudo-terminal of servos or microcontroller.
+        config: ``camera.source.url`` is ``unix:PATH``, the socket of the images.
         truth: CSV file for the true tip state at every step of the plant, for evaluation only.
         modes: Supported modes of operation of CiA 402 drives.
 

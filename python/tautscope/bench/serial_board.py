@@ -11,9 +11,6 @@ _STILL = (State.DISABLED, State.FAULT)
 class SerialBoard:
     """The state machine; its owner moves the motors, and sets `positions` and `faults`.
 
-    Args:
-        axes: Limits of each axis.
-
     Attributes:
         state: What it does.
         targets, positions: Of each axis [counts].

@@ -27,14 +27,7 @@ INSTRUCTION, CHECKSUM, DATA_RANGE, DATA_LENGTH, ACCESS = 2, 3, 4, 5, 7
 
 
 class SimulatedServo:
-    """One servo.
-
-    Args:
-        axis: Of the true rig: id, model.
-        protocol: Its family.
-        shaft: Where its horn is [counts], with all turns; these are unknown to it.
-        log: Called with the time and the event.
-    """
+    """One servo; `shaft` is where its horn is [counts], with all turns, which are unknown to it."""
 
     def __init__(
         self, axis: AxisConfig, protocol: str, shaft: int, log: Callable[[float, str], None]
@@ -54,7 +47,8 @@ class SimulatedServo:
         self._turns = 0
         self._log = log
         self._far_since: float | None = None
-        self._heard_at = 0.0
+        self.heard_at = 0.0
+        """Time of the last instruction packet on the line."""
         identity = {(self._id_address, 1): axis.node}
         for (address, size), value in (_FACTORY[protocol] | identity).items():
             self.memory[address : address + size] = value.to_bytes(size, "little")
@@ -106,10 +100,6 @@ class SimulatedServo:
             self._log(now, "torque off" if torque else "torque on")
         return 0
 
-    def hear(self, now: float) -> None:
-        """Take note of an instruction packet on the line."""
-        self._heard_at = now
-
     @property
     def error(self) -> int:
         """The error of an answer that refuses nothing."""
@@ -127,7 +117,7 @@ class SimulatedServo:
         family, watchdog = self.family, self.family.watchdog
         has_torque = self.get(family.torque) == 1
         limit = self.get(watchdog) if watchdog is not None and has_torque else 0
-        if watchdog is not None and 0 < limit < 128 and now - self._heard_at > limit * 0.02:
+        if watchdog is not None and 0 < limit < 128 and now - self.heard_at > limit * 0.02:
             self.set(watchdog, 255)
             self._log(now, "bus watchdog")
         is_stopped = watchdog is not None and self.get(watchdog) == 255

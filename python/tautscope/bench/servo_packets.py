@@ -19,8 +19,6 @@ class Packet(NamedTuple):
 
     Attributes:
         servo: Id, or `BROADCAST`.
-        instruction: One of the numbers above, or another.
-        data: Its parameters.
         is_intact: Whether the checksum is right.
         size: Length on the line [byte].
     """

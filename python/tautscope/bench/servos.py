@@ -7,18 +7,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tautscope.bench import servo_packets as packets
 from tautscope.bench.line_motors import LineMotors
-from tautscope.bench.servo import (
-    CHECKSUM,
-    DATA_LENGTH,
-    INSTRUCTION,
-    OVERLOAD,
-    SimulatedServo,
-)
+from tautscope.bench.servo import CHECKSUM, DATA_LENGTH, INSTRUCTION, OVERLOAD, SimulatedServo
 from tautscope.bench.servo_packets import DynamixelPackets, FeetechPackets, Packet
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
@@ -32,37 +23,29 @@ class SimulatedServos(LineMotors):
     moment. unplug: the adapter is gone, of all motors.
     """
 
-    kinds = ("drop", "delay", "fault", "freeze", "restart", "unplug")
-
     def __init__(self, config: DrivesConfig, *arguments: Any, **options: Any) -> None:
         super().__init__(config, *arguments, **options)
         self._is_v2 = config.protocol == "dynamixel"
         self._codec = DynamixelPackets() if self._is_v2 else FeetechPackets()
         self._word = 2 if self._is_v2 else 1
-        shafts = [
-            scale.to_counts(float(at)) for scale, at in zip(self._scales, self._start, strict=True)
-        ]
         self.servos = [
-            SimulatedServo(config[dof], config.protocol, shaft, partial(self._log, dof))
-            for dof, shaft in zip(config.all_motors, shafts, strict=True)
+            SimulatedServo(config[dof], config.protocol, self._start[dof], partial(self._log, dof))
+            for dof in config.all_motors
         ]
         self._events.clear()
 
     def _process(self, now: float) -> None:
         for packet in self._codec.split(self._buffer):
             for servo in self._listening():
-                servo.hear(now)
+                servo.heard_at = now
             self._serve(packet, now)
 
-    def _advance(self, period: float, now: float) -> list[float]:
-        return [
-            scale.to_position(servo.advance(period, now))
-            for scale, servo in zip(self._scales, self.servos, strict=True)
-        ]
+    def _advance(self, period: float, now: float) -> list[int]:
+        return [servo.advance(period, now) for servo in self.servos]
 
-    def _move(self, positions: NDArray[np.float64]) -> None:
-        for scale, servo, position in zip(self._scales, self.servos, positions, strict=True):
-            servo.move(scale.to_counts(float(position)))
+    def _move(self, shafts: list[int]) -> None:
+        for servo, shaft in zip(self.servos, shafts, strict=True):
+            servo.move(shaft)
 
     def _listening(self) -> Iterator[SimulatedServo]:
         return (

@@ -8,11 +8,10 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.bench.events import EventPrinter
+from tautscope.bench.events import print_events
 from tautscope.bench.requests import raise_errors_of_threads, serve_requests
 from tautscope.commands import arguments
 from tautscope.config.microcontroller import SERIAL_PORTS
@@ -111,7 +110,7 @@ def _bench(options: argparse.Namespace) -> None:
             target=_inject_faults, args=(bench, sorted(options.faults), stopping)
         )
         injector.start()
-        with closing(EventPrinter(lambda: bench.events)):
+        with print_events(lambda: bench.events):
             try:
                 serve_requests(bench.request)
             finally:

@@ -3,6 +3,7 @@
 import argparse
 import itertools
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 from tautscope.commands import arguments
@@ -143,7 +144,7 @@ def _doctor(options: argparse.Namespace) -> int:
             findings.append(found)
             _print(found)
     missing = sum(found.status == "missing" for found in findings)
-    shown = [found.to_json() for found in findings]
+    shown = [asdict(found) for found in findings]
     print_json(options, {"complete": not missing, "findings": shown})
     result = f"{missing} missing." if missing else "All there."
     print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")

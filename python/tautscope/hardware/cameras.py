@@ -40,7 +40,7 @@ class Capture:
     arrived_at: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class CameraState:
     """State of a camera.
 
@@ -125,8 +125,7 @@ class Camera:
         with self._lock:
             state = replace(self._state, age=self._clock() - self._arrived_at)
         if not state.trouble and state.age > self._source.timeout:
-            trouble = f"no frame for {state.age:.1f} s; is the camera on and connected?"
-            return replace(state, trouble=trouble)
+            state.trouble = f"no frame for {state.age:.1f} s; is the camera on and connected?"
         return state
 
     def close(self) -> None:
@@ -161,12 +160,12 @@ class Camera:
                 trouble = f"{source.url}: {type(error).__name__}: {error}"
                 self._error = CameraError("camera.source", trouble, "frames")
             with self._lock:
-                self._state = replace(self._state, trouble=trouble)
+                self._state.trouble = trouble
             if is_permanent:
                 self._is_tested.set()
             if not self._is_closing.wait(source.reconnect_period):
                 with self._lock:
-                    self._state = replace(self._state, reconnects=self._state.reconnects + 1)
+                    self._state.reconnects += 1
 
     def _read(self, decoder: Decoder) -> None:
         stream_clock, last = StreamClock(self._source), None
@@ -182,17 +181,12 @@ class Camera:
             capture = Capture(frame, arrived_at)
             with self._lock:
                 state = self._state
-                self._state = replace(
-                    state,
-                    received=state.received + 1,
-                    lost=state.lost + lost,
-                    skipped=state.skipped + (self._newest is not None),
-                    damaged=decoder.damaged,
-                    is_interlaced=decoder.is_interlaced,
-                    trouble="",
-                )
-                self._newest = capture
-                self._arrived_at = arrived_at
+                state.received += 1
+                state.lost += lost
+                state.skipped += self._newest is not None
+                state.damaged, state.is_interlaced = decoder.damaged, decoder.is_interlaced
+                state.trouble = ""
+                self._newest, self._arrived_at = capture, arrived_at
             if not self._is_tested.is_set():
                 self._test_captures.append(capture)
                 if len(self._test_captures) == TEST_FRAMES:

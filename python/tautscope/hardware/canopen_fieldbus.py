@@ -21,19 +21,8 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from tautscope.config import DrivesConfig
 from tautscope.dof import Motor
 from tautscope.errors import ConfigError, DriveError, SettingRefusedError, SilentDriveError
+from tautscope.hardware import canopen_master as master
 from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.canopen_master import (
-    PRE_OPERATIONAL,
-    RX_PDO_1,
-    RX_PDO_2,
-    SDO_REQUEST,
-    SDO_RESPONSE,
-    STOP,
-    TX_PDO_1,
-    CanopenMaster,
-    bus_lost,
-    open_bus,
-)
 from tautscope.hardware.cia402 import Mode
 from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.eds import Described, load_eds
@@ -47,8 +36,7 @@ from tautscope.hardware.fieldbus import (
 )
 from tautscope.hardware.object_dictionary import SIZES, Entry
 
-EVENT_DRIVEN, AT_EVERY_SYNC = 255, 1
-"""PDO transmission types."""
+EVENT_DRIVEN, AT_EVERY_SYNC = 255, 1  # PDO transmission types
 INVALID = 1 << 31
 """Bit 31 of a PDO's COB-ID: the PDO is not valid."""
 NO_RTR = 1 << 30
@@ -76,12 +64,8 @@ class _Sdo(SdoClient):
         self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
 
 
-class CanopenFieldbus(CanopenMaster, Fieldbus):
-    """Drives on a CAN bus; a `Fieldbus`.
-
-    Args:
-        config: Bus, nodes, timeouts.
-        bus: An open bus instead of the configured one; it is closed with this object.
+class CanopenFieldbus(master.CanopenMaster, Fieldbus):
+    """Drives on the configured CAN bus, or on `bus`, which is closed with them; a `Fieldbus`.
 
     Raises:
         ConfigError: An EDS file is missing, unreadable or describes another drive.
@@ -91,16 +75,17 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
 
     def __init__(self, config: DrivesConfig, bus: can.BusABC | None = None) -> None:
         self._described = {dof: _description(config, dof) for dof in config.all_motors}
-        super().__init__(config, open_bus(config) if bus is None else bus)
+        super().__init__(config, master.open_bus(config) if bus is None else bus)
+        self.names = [node.name for node in self.nodes.values()]
         self._network = Network()
         self._network.bus = self._bus
-        self._sdo: dict[Motor, _Sdo] = {}
-        for dof in config.all_motors:
-            node = config[dof].node
-            sdo = _Sdo(SDO_REQUEST + node, SDO_RESPONSE + node, ObjectDictionary())  # type: ignore[no-untyped-call]
+        self._sdo: list[_Sdo] = []
+        for node in self.nodes.values():
+            cobs = master.SDO_REQUEST + node.id, master.SDO_RESPONSE + node.id
+            sdo = _Sdo(*cobs, ObjectDictionary())  # type: ignore[no-untyped-call]
             sdo.network, sdo.timeout = self._network, config.request_timeout
-            sdo.receive_one = self.receive_one
-            self._sdo[dof] = sdo
+            sdo.receive_one, sdo.responses = self.receive_one, node.sdo_responses
+            self._sdo.append(sdo)
         try:
             self.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)
             for dof in config.all_motors:
@@ -109,38 +94,26 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
             self.close()
             raise
 
-    def name(self, dof: Motor) -> str:
-        """See `Fieldbus.name`."""
-        return self.nodes[dof].name
-
     def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure producer and consumer heartbeats and the PDOs, and read them back."""
         config = self._config
         for dof in self._config.all_motors:
             node = self.nodes[dof]
-            self.send_nmt(PRE_OPERATIONAL, node.id)
+            self.send_nmt(master.PRE_OPERATIONAL, node.id)
             period = round(config.heartbeat_period * 1e3)
             timeout = round(config.heartbeat_timeout * 1e3)
             node.has_heartbeat = self._set_or_waive(dof, objects.PRODUCER_HEARTBEAT, period)
             # Some drives refuse a second consumer entry for the same producer.
             for value in (0, config.master_node << 16 | timeout):
                 self._set_or_waive(dof, objects.CONSUMER_HEARTBEAT, value)
-            self._map(dof, 0x1400, RX_PDO_1, EVENT_DRIVEN, (objects.CONTROLWORD,))
-            self._map(dof, 0x1401, RX_PDO_2, AT_EVERY_SYNC, (target_object(modes[dof]),))
-            self._map(dof, 0x1800, TX_PDO_1, AT_EVERY_SYNC, TX_PDO_OBJECTS)
+            self._map(dof, 0x1400, master.RX_PDO_1, EVENT_DRIVEN, (objects.CONTROLWORD,))
+            self._map(dof, 0x1401, master.RX_PDO_2, AT_EVERY_SYNC, (target_object(modes[dof]),))
+            self._map(dof, 0x1800, master.TX_PDO_1, AT_EVERY_SYNC, TX_PDO_OBJECTS)
             for base in (0x1402, 0x1403, 0x1801, 0x1802, 0x1803):
                 self._disable_pdo(dof, base)
 
     def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
-        """See `Fieldbus.exchange`.
-
-        Raises:
-            EmergencyError: A drive sent an emergency object.
-            HeartbeatError: A drive's heartbeat is missing.
-            StateError: A drive restarted.
-            SecondMasterError: Another master sends frames.
-            BusError: The bus is lost.
-        """
+        """See `Fieldbus.exchange`; raises also what `check` raises."""
         self.receive_pending()
         self.check()  # frames since the last cycle
         feedback = self.cycle(controlwords, targets)
@@ -158,7 +131,7 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
         self.is_monitoring = False
         with suppress(DriveError):  # the bus may be lost
             for dof in dofs:
-                self.send_nmt(STOP, self.nodes[dof].id)
+                self.send_nmt(master.STOP, self.nodes[dof].id)
 
     def close(self) -> None:
         """Switch the drives' heartbeat consumers off and release the bus."""
@@ -176,36 +149,27 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
         with suppress(can.CanError, OSError):  # the adapter may be unplugged
             self._bus.shutdown()
 
-    def _on_sdo_response(self, node: int, data: bytes) -> None:
-        for sdo in self._sdo.values():
-            if sdo.tx_cobid == SDO_RESPONSE + node:
-                sdo.responses.put(data)
-
     def _size(self, dof: Motor, entry: Entry) -> int:
         number = self._described[dof].types.get((entry.index, entry.subindex), 0)
         return SIZES.get(number, entry.size)
 
-    def _upload(self, dof: Motor, entry: Entry) -> bytes:
-        return self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
-
-    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
-        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
-
-    def _request(self, dof: Motor, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
-        node = self.nodes[dof]
+    def _transfer(self, dof: Motor, entry: Entry, what: object, data: bytes | None = None) -> bytes:
+        name, sdo = self.names[dof], self._sdo[dof]
         try:
-            data = transfer(self._sdo[dof])
+            if data is None:
+                return sdo.upload(entry.index, entry.subindex)
+            sdo.download(entry.index, entry.subindex, data)
         except SdoAbortedError as error:
-            raise abort_error(node.name, what, error.code, error) from None
+            raise abort_error(name, what, error.code, error) from None
         except SdoCommunicationError as error:
             raise SilentDriveError(
-                node.name,
+                name,
                 f"no answer to an SDO request for {what} ({error})",
                 f"Check {dof.key}.node, its supply, the bus and the bit rate",
             ) from None
         except (can.CanError, OSError, RuntimeError) as error:
-            raise bus_lost(error) from error
-        return data if data is not None else b""
+            raise master.bus_lost(error) from error
+        return b""
 
     def _set(self, dof: Motor, entry: Entry, value: int) -> None:
         self.write(dof, entry, value)
@@ -224,8 +188,7 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
         self, dof: Motor, base: int, cob: int, transmission_type: int, entries: tuple[Entry, ...]
     ) -> None:
         """Configure a PDO in the order of CiA 301: invalidate, change, validate."""
-        name = f"PDO 0x{base:04X}"
-        identifier, transmission, count, *mapped = objects.pdo_entries(base, base + 0x200, 0, name)
+        identifier, transmission, count, *mapped = objects.pdo_entries(base)
         valid = cob + self.nodes[dof].id
         if base >= 0x1800:
             valid |= self.read(dof, identifier) & NO_RTR
@@ -254,13 +217,11 @@ class CanopenFieldbus(CanopenMaster, Fieldbus):
 
     def _disable_pdo(self, dof: Motor, base: int) -> None:
         """Invalidate an unused PDO, if the drive has it."""
-        identifier = objects.pdo_entries(base, base + 0x200, 0, f"PDO 0x{base:04X}")[0]
-        try:
+        identifier = objects.pdo_entries(base)[0]
+        with suppress(AbsentError):
             value = self.read(dof, identifier)
             if not value & INVALID:
                 self.write(dof, identifier, value | INVALID)
-        except AbsentError:
-            pass
 
 
 def _description(config: DrivesConfig, dof: Motor) -> Described:

@@ -14,9 +14,9 @@ checked as they are read.
 
 import struct
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from queue import Queue
 from typing import Any
 
 import can
@@ -39,11 +39,7 @@ class Node:
     """State of the communication with one drive.
 
     Attributes:
-        name: Its name for messages.
-        id: Node id.
-        feedback: Its newest process data.
-        heartbeat_at: Time of its last heartbeat [s, monotonic clock].
-        nmt_state: NMT state in its last heartbeat.
+        heartbeat_at, nmt_state: Time [s, monotonic clock] and NMT state of its last heartbeat.
         was_operational: Whether a heartbeat has reported operational.
         has_heartbeat: Whether it sends heartbeats; else its answers alone are checked.
         controlword: The controlword sent last; None if it must be sent again.
@@ -59,15 +55,11 @@ class Node:
     has_heartbeat: bool = True
     controlword: int | None = None
     emergency: bytes = b""
+    sdo_responses: Queue[bytes] = field(default_factory=Queue)
 
 
-class CanopenMaster(ABC):
-    """Exchanges frames with drives and checks their heartbeats and emergency objects.
-
-    Args:
-        config: Node ids and timeouts.
-        bus: An open CAN bus.
-    """
+class CanopenMaster:
+    """Exchanges frames with drives and checks their heartbeats and emergency objects."""
 
     def __init__(self, config: DrivesConfig, bus: can.BusABC) -> None:
         self._config = config
@@ -171,16 +163,12 @@ class CanopenMaster(ABC):
             one.statusword, one.position, one.mode = TX_PDO.unpack_from(data)
             one.age, one.answered_at, one.answers = 0, now, one.answers + 1
         elif function == SDO_RESPONSE and len(data) == 8:
-            self._on_sdo_response(node.id, data)
+            node.sdo_responses.put(data)
         elif function == HEARTBEAT and data:
             node.heartbeat_at, node.nmt_state = now, data[0] & 0x7F
             node.was_operational |= node.nmt_state == OPERATIONAL
         elif function == EMERGENCY and len(data) == 8 and data[:2] != b"\0\0":
             node.emergency = node.emergency or data
-
-    @abstractmethod
-    def _on_sdo_response(self, node: int, data: bytes) -> None:
-        """Handle the SDO response of a node."""
 
     def detect_second_master(self, duration: float) -> None:
         """Listen for another master for `duration` [s] before anything is sent."""
@@ -228,11 +216,7 @@ class CanopenMaster(ABC):
 
 
 def open_bus(config: DrivesConfig) -> can.BusABC:
-    """Open the configured CAN bus.
-
-    Raises:
-        BusError: The bus cannot be opened.
-    """
+    """Open the configured CAN bus."""
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:
         return can.Bus(interface=config.interface, channel=config.channel, **options)

@@ -39,17 +39,10 @@ CONFIRMATIONS = 2
 
 
 class Cia402Drives(DriveGroup):
-    """CiA 402 drives on a fieldbus; a `tautscope.hardware.drive_group.DriveGroup`.
-
-    Args:
-        config: Cycle and timeouts.
-        bus: The open bus; it is closed with the drives.
-
-    Every method raises what `Fieldbus` raises.
-    """
+    """CiA 402 drives on an open bus, which is closed with them; a `DriveGroup`."""
 
     def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
-        super().__init__(config)
+        super().__init__(config, bus.names, bus.close)
         self._bus = bus
         self._modes: dict[Motor, Mode] = {}
         self._controlwords = [cia402.DISABLE_VOLTAGE] * len(config.all_motors)
@@ -61,10 +54,6 @@ class Cia402Drives(DriveGroup):
         # A drive samples its position when the set-point arrives; buffered set-points act later.
         is_buffered = Mode.INTERPOLATED_POSITION in self._modes.values()
         return 1 + (self._config.lead_points if is_buffered else 0)
-
-    def name(self, dof: Motor) -> str:
-        """See `DriveGroup.name`."""
-        return self._bus.name(dof)
 
     def serial_number(self, dof: Motor) -> str:
         """The serial number in the identity object (0x1018:4)."""
@@ -122,11 +111,7 @@ class Cia402Drives(DriveGroup):
         return self._bus.exchange([cia402.QUICK_STOP] * len(self._targets), self._targets)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
-        """Run one cycle with new target positions [counts].
-
-        Raises:
-            StateError: A drive left operation enabled or its mode, or ignores set-points.
-        """
+        """Run one cycle with new target positions [counts], and check the states."""
         self._targets = targets
         self._cycle()
         for dof in self._config.all_motors:
@@ -134,12 +119,7 @@ class Cia402Drives(DriveGroup):
         return self._feedback
 
     def enable(self, *, reset_faults: bool) -> list[Feedback]:
-        """See `DriveGroup.enable`.
-
-        Raises:
-            StateError: A drive is in fault, or did not reach a state within `state_timeout`.
-            SilentDriveError: A drive did not answer within `state_timeout`.
-        """
+        """See `DriveGroup.enable`; `state_timeout` is for each state."""
         self._was_enabled = True
         # Not those of an earlier run, which would enable drives that quick stop holds.
         self._controlwords = [cia402.DISABLE_VOLTAGE] * len(self._targets)
@@ -159,10 +139,6 @@ class Cia402Drives(DriveGroup):
         self._await_rest(lambda: self._bus.broadcast(cia402.QUICK_STOP, self._targets))
         return self._command_until(cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES)
 
-    def close(self) -> None:
-        """Release the bus; a second call does nothing."""
-        self._bus.close()
-
     def _command_until(self, controlword: int, states: frozenset[State]) -> list[str]:
         """Repeat a controlword until all drives confirm a state; names of those that do not."""
         confirmed = [0] * len(self._targets)
@@ -180,7 +156,7 @@ class Cia402Drives(DriveGroup):
         pending = [dof for dof in self._config.all_motors if confirmed[dof] < CONFIRMATIONS]
         if pending:
             self._bus.stop_communication(pending)
-        return [self._bus.name(dof) for dof in pending]
+        return [self.names[dof] for dof in pending]
 
     def _cycle(self) -> None:
         feedback = self._bus.exchange(self._controlwords, self._targets)
@@ -219,7 +195,7 @@ class Cia402Drives(DriveGroup):
                     seen[dof].add(state)
                     since[dof] = time.monotonic()
                 elif time.monotonic() - since[dof] > timeout:
-                    raise transition_error(self._bus.name(dof), feedback, self._modes[dof], timeout)
+                    raise transition_error(self.names[dof], feedback, self._modes[dof], timeout)
             if all_done:
                 return
 
@@ -233,7 +209,7 @@ class Cia402Drives(DriveGroup):
 
     def _enable(self, dof: Motor, state: State | None, feedback: Feedback) -> bool:
         if state is State.FAULT:
-            raise state_error(self._bus.name(dof), feedback)
+            raise state_error(self.names[dof], feedback)
         word = cia402.next_controlword(state)
         if word is not None:
             self._controlwords[dof] = word
@@ -243,16 +219,16 @@ class Cia402Drives(DriveGroup):
 
     def _start_following(self, dof: Motor, state: State | None, feedback: Feedback) -> bool:
         if state is not State.OPERATION_ENABLED:
-            raise state_error(self._bus.name(dof), feedback)
+            raise state_error(self.names[dof], feedback)
         if self._modes[dof] is Mode.INTERPOLATED_POSITION:
             self._controlwords[dof] = cia402.ENABLE_INTERPOLATION
         is_entered = "6061" not in self._config.waive or feedback.mode == self._modes[dof]
         return is_entered and self._follows(feedback)
 
     def _check_state(self, dof: Motor, feedback: Feedback) -> None:
-        name, mode = self._bus.name(dof), self._modes[dof]
+        name, mode = self.names[dof], self._modes[dof]
         if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
-            raise state_error(self._bus.name(dof), feedback)
+            raise state_error(self.names[dof], feedback)
         if feedback.mode != mode:
             raise StateError(
                 name,

@@ -34,12 +34,11 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Motor) -> CommissionedD
         ModeRefusedError: It is no CiA 402 drive, has neither mode, or did not enter it.
         SettingRefusedError: A setting was refused or reads back differently, or the drive lacks a
             protection that is not waived.
-        DriveError: As `tautscope.hardware.fieldbus.Fieldbus`.
     """
     device_type = bus.read(dof, objects.DEVICE_TYPE)
     if device_type & 0xFFFF != CIA_402:
         raise ModeRefusedError(
-            bus.name(dof),
+            bus.names[dof],
             f"its device type is 0x{device_type:08X}, not that of a CiA 402 drive",
             f"Check {dof.key}.node",
         )
@@ -47,9 +46,9 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Motor) -> CommissionedD
     setup.set_protections()
     setup.set_limits()
     mode = setup.enter_mode()
-    _LOG.info("%s: mode %d, settings read back", bus.name(dof), mode)
+    _LOG.info("%s: mode %d, settings read back", bus.names[dof], mode)
     return CommissionedDrive(
-        bus.name(dof),
+        bus.names[dof],
         bus.read_or_zero(dof, objects.VENDOR_ID),
         bus.read_or_zero(dof, objects.PRODUCT_CODE),
         mode,
@@ -126,13 +125,13 @@ class _DriveSetup:
             if not shown and "6061" in config.waive:
                 break
             if time.monotonic() > deadline:
-                raise mode_refused(bus.name(dof), mode, shown)
+                raise mode_refused(bus.names[dof], mode, shown)
             time.sleep(config.cycle)
         return mode
 
     def _modes(self) -> tuple[Mode, ...]:
         """The mode to enter; both, in this order, if the drive does not tell and that is waived."""
-        name, config = self._bus.name(self._dof), self._config
+        name, config = self._bus.names[self._dof], self._config
         try:
             supported = self._bus.read(self._dof, objects.SUPPORTED_MODES)
         except AbsentError as error:

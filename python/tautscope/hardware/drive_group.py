@@ -2,7 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,9 +53,7 @@ class CommissionedDrive:
     """A drive's identity and settings.
 
     Attributes:
-        name: Its name for messages.
-        vendor, product: Numbers in its identity; 0 where they are missing.
-        mode: The mode of operation it entered; 0 is not shown.
+        vendor, product, mode: Of a CiA 402 drive; 0 where they are missing.
         settings: Setting and value as read back.
         absent: Settings that the drive lacks.
     """
@@ -95,10 +93,14 @@ class DriveGroup(ABC):
 
     Args:
         config: Drives, limits and timeouts.
+        names: The drives' names for messages: DOF and node.
+        close: Releases the bus; a second call does nothing.
     """
 
-    def __init__(self, config: DrivesConfig) -> None:
-        self._config = config
+    def __init__(
+        self, config: DrivesConfig, names: Sequence[str], close: Callable[[], None]
+    ) -> None:
+        self._config, self.names, self.close = config, names, close
         self._feedback = [Feedback() for _ in config.all_motors]
         self._sent_at = self._stopped_at = 0.0
         self._is_moving = self._was_enabled = self._is_unconfirmed = False
@@ -107,10 +109,6 @@ class DriveGroup(ABC):
     def pending(self) -> int:
         """Number of newest set-points that cannot have an effect yet when positions are read."""
         return 1
-
-    @abstractmethod
-    def name(self, dof: Motor) -> str:
-        """The drive's name for messages: DOF and node."""
 
     def serial_number(self, dof: Motor) -> str:
         """The drive's serial number; empty where it is missing."""
@@ -186,10 +184,6 @@ class DriveGroup(ABC):
         return ""
 
     @abstractmethod
-    def close(self) -> None:
-        """Release the bus; a second call does nothing."""
-
-    @abstractmethod
     def _stop(self) -> list[str]:
         """Stop all motors; names of those that do not confirm it."""
 
@@ -214,11 +208,7 @@ class DriveGroup(ABC):
             time.sleep(self._config.cycle)
 
     def _check_pause(self, name: str) -> None:
-        """Note that a set-point is sent, unless the drives' watchdogs may have stopped them.
-
-        Raises:
-            StateError: More than `heartbeat_timeout` passed since the last set-point.
-        """
+        """Note that a set-point is sent; `StateError` if the drives' watchdogs may have tripped."""
         now = time.monotonic()
         pause, self._sent_at = now - self._sent_at, now
         if pause > self._config.heartbeat_timeout:

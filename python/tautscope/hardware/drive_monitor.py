@@ -23,7 +23,6 @@ class BusStatistics:
     Attributes:
         late: Per motor, cycles that ended before the answer of the drive came.
         lost: Per motor, answers that never came; a pending answer counts until it comes.
-        cycles: Set-points sent.
         longest_pause: Longest time between two cycles, or of the one that failed [s].
     """
 
@@ -34,29 +33,15 @@ class BusStatistics:
 
 
 class DriveMonitor:
-    """Checks the feedback of drives in each cycle.
-
-    Args:
-        config: Limits and timeouts.
-        names: The drives' names for messages.
-        pending: As in `DriveGroup`.
-    """
+    """Checks the feedback of drives in each cycle; `names` and `pending` are of `DriveGroup`."""
 
     def __init__(self, config: DrivesConfig, names: Sequence[str], pending: int) -> None:
         self._config = config
         self._names = names
         self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
-        self._before: list[tuple[float, int]] = []
-        """Position [m or rad] and age of each motor in the last cycle."""
-        self._answers = [0] * len(self._scales)
-        self._late = [0] * len(self._scales)
-        """Cycles in a row that ended before the answer of each motor came: it is not checked."""
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
         self._last_cycle = 0.0
-        self.statistics = self._no_cycles()
-
-    def _no_cycles(self) -> BusStatistics:
-        return BusStatistics([0] * len(self._scales), [0] * len(self._scales))
+        self.reset([Feedback()] * len(self._scales))
 
     def begin_cycle(self) -> None:
         """Count a cycle, and the time since the one before."""
@@ -73,10 +58,12 @@ class DriveMonitor:
     def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
         """Start from motors that are enabled and at rest; their positions (n,) [m or rad]."""
         self._answers = [one.answers for one in feedback]
-        self.statistics = self._no_cycles()
+        self.statistics = BusStatistics([0] * len(feedback), [0] * len(feedback))
         start = self.positions(feedback)
         self._before = [(at, 0) for at in start]
-        self._late = [0] * len(start)
+        """Position [m or rad] and age of each motor in the last cycle."""
+        self._late = [0] * len(feedback)
+        """Cycles in a row that ended before the answer of each motor came: it is not checked."""
         self._following.reset(start)
         return start
 
@@ -108,11 +95,7 @@ class DriveMonitor:
         return positions
 
     def check_start_positions(self, counts: Sequence[int]) -> None:
-        """Check, before the motors are enabled, that each is inside its travel.
-
-        Raises:
-            FollowingError: A motor is outside.
-        """
+        """Raise the error for a motor outside its travel, before the motors are enabled."""
         for dof, scale in zip(self._config.all_motors, self._scales, strict=True):
             position = scale.to_position(counts[dof])
             if not scale.is_inside(position):

@@ -93,6 +93,9 @@ class Drives:
         group: The drives on an open bus, which is closed with them.
         lock: Released with the drives.
 
+    Attributes:
+        cycle: Time from one `exchange` to the next [s].
+
     Raises:
         ModeRefusedError: A drive has neither mode 8 nor 7, or did not enter it.
         SettingRefusedError: A setting was refused, or reads back differently.
@@ -102,7 +105,7 @@ class Drives:
     def __init__(
         self, config: DrivesConfig, group: DriveGroup, lock: RigLock | None = None
     ) -> None:
-        self.config = config
+        self.config, self.cycle = config, config.cycle
         self._lock = lock
         self._group = group
         self._scales = [Scale(config[dof], dof) for dof in config.all_motors]
@@ -111,18 +114,11 @@ class Drives:
         self._previous: NDArray[np.float64] = np.zeros(len(config.all_motors))
         try:
             self.commissioned = tuple(group.commission(dof) for dof in config.all_motors)
-            self._monitor = DriveMonitor(
-                config, [group.name(dof) for dof in config.all_motors], group.pending
-            )
+            self._monitor = DriveMonitor(config, group.names, group.pending)
             group.configure()
         except BaseException:
             group.close()
             raise
-
-    @property
-    def cycle(self) -> float:
-        """Time from one `exchange` to the next [s]."""
-        return self.config.cycle
 
     @property
     def is_running(self) -> bool:

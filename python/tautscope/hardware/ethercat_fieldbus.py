@@ -9,8 +9,7 @@ process data, not by distributed clocks.
 
 import struct
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tautscope.config import DrivesConfig
@@ -28,26 +27,10 @@ from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
 from tautscope.hardware.drive_group import RESET, Feedback
-from tautscope.hardware.fieldbus import (
-    TX_PDO,
-    TX_PDO_OBJECTS,
-    Fieldbus,
-    abort_error,
-    target_object,
-)
+from tautscope.hardware.fieldbus import TX_PDO, TX_PDO_OBJECTS, Fieldbus, abort_error, target_object
 from tautscope.hardware.object_dictionary import Entry
 
 _RX_PDO = struct.Struct("<Hi")
-
-
-@dataclass(slots=True)
-class _Slave:
-    """State of the communication with one drive."""
-
-    name: str
-    device: Any
-    tx_pdo: tuple[int, ...] = (0, 0, 0)
-    is_enabled: bool = False
 
 
 class EthercatFieldbus(Fieldbus):
@@ -92,24 +75,18 @@ class EthercatFieldbus(Fieldbus):
         except BaseException:
             self.close()
             raise
-        self._slaves = {
-            dof: _Slave(
-                f"{dof.label}, device {config[dof].node}", self._master.slaves[config[dof].node - 1]
-            )
-            for dof in config.all_motors
-        }
-
-    def name(self, dof: Motor) -> str:
-        """See `Fieldbus.name`."""
-        return self._slaves[dof].name
+        self.names = [f"{dof.label}, device {config[dof].node}" for dof in config.all_motors]
+        self._devices = [self._master.slaves[config[dof].node - 1] for dof in config.all_motors]
+        self._tx_pdos: list[tuple[int, ...]] = [(0, 0, 0)] * len(self._devices)
+        self._were_enabled = [False] * len(self._devices)
 
     def configure(self, modes: Mapping[Motor, Mode]) -> None:
         """Configure the mapping and the watchdog of the process data."""
         for dof in self._config.all_motors:
             self._map(dof, 0x1C12, 0x1600, (objects.CONTROLWORD, target_object(modes[dof])))
             self._map(dof, 0x1C13, 0x1A00, TX_PDO_OBJECTS)
-            device = self._slaves[dof].device
-            device.set_watchdog("processdata", self._config.heartbeat_timeout * 1e3)
+            watchdog = self._config.heartbeat_timeout * 1e3
+            self._devices[dof].set_watchdog("processdata", watchdog)
         try:
             self._master.config_map()
         except self._soem.ConfigMapError as error:
@@ -121,23 +98,17 @@ class EthercatFieldbus(Fieldbus):
     def start(self) -> None:
         """Bring the line to operational; process data flows from here on."""
         self._answered_at, self._age = time.monotonic(), 0
-        for slave in self._slaves.values():
-            slave.is_enabled = False
-        targets = [self._slaves[dof].tx_pdo[1] for dof in self._config.all_motors]
+        self._were_enabled = [False] * len(self._devices)
+        targets = [position for _, position, _ in self._tx_pdos]
         self._exchange([cia402.DISABLE_VOLTAGE] * len(targets), targets)
         self._reach(self._soem.OP_STATE, "operational")
 
     def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
-        """See `Fieldbus.exchange`.
-
-        Raises:
-            EmergencyError: A drive went from operation enabled to a fault.
-            BusError: The adapter is lost.
-        """
+        """See `Fieldbus.exchange`; `EmergencyError` if an enabled drive went to a fault."""
         feedback = self._exchange(controlwords, targets)
-        for dof, slave in self._slaves.items():
-            state = cia402.state_of(slave.tx_pdo[0])
-            if slave.is_enabled and state in (State.FAULT, State.FAULT_REACTION):
+        for dof in self._config.all_motors:
+            state = cia402.state_of(feedback[dof].statusword)
+            if self._were_enabled[dof] and state in (State.FAULT, State.FAULT_REACTION):
                 # The mailbox may take most of a second, in which the others would move on.
                 self.broadcast(cia402.QUICK_STOP, targets)
                 try:
@@ -145,11 +116,11 @@ class EthercatFieldbus(Fieldbus):
                 except DriveError:
                     code = "not read: its mailbox does not answer"
                 raise EmergencyError(
-                    slave.name,
+                    self.names[dof],
                     f"it went to {state}, error code {code}",
                     f"Look the code up in the drive's manual, then {RESET}",
                 )
-            slave.is_enabled = state is State.OPERATION_ENABLED
+            self._were_enabled[dof] = state is State.OPERATION_ENABLED
         return feedback
 
     def broadcast(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
@@ -176,8 +147,8 @@ class EthercatFieldbus(Fieldbus):
             self._master.close()
 
     def _exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
-        for dof, slave in self._slaves.items():
-            slave.device.output = _RX_PDO.pack(controlwords[dof], targets[dof])
+        for device, word, target in zip(self._devices, controlwords, targets, strict=True):
+            device.output = _RX_PDO.pack(word, target)
         try:
             self._master.send_processdata()
             counter = self._master.receive_processdata(round(self._config.reply_timeout * 1e6))
@@ -191,19 +162,9 @@ class EthercatFieldbus(Fieldbus):
         else:
             self._age, self._answered_at = 0, now
             self._answers += 1
-            for slave in self._slaves.values():
-                slave.tx_pdo = TX_PDO.unpack_from(bytes(slave.device.input))
-        return [
-            Feedback(
-                position,
-                self._age,
-                self._answers,
-                silence=now - self._answered_at,
-                statusword=statusword,
-                mode=mode,
-            )
-            for statusword, position, mode in (slave.tx_pdo for slave in self._slaves.values())
-        ]
+            self._tx_pdos = [TX_PDO.unpack_from(bytes(device.input)) for device in self._devices]
+        times = self._age, self._answers, self._answered_at, now - self._answered_at
+        return [Feedback(position, *times, word, mode) for word, position, mode in self._tx_pdos]
 
     def _reach(self, state: int, name: str) -> None:
         """Request a state of all slaves and wait for it while process data are exchanged."""
@@ -214,10 +175,9 @@ class EthercatFieldbus(Fieldbus):
             if time.monotonic() > deadline:
                 self._master.read_state()
                 behind = [
-                    f"{slave.name} in 0x{slave.device.state:02X}, AL status "
-                    f"0x{slave.device.al_status:04X}"
-                    for slave in self._slaves.values()
-                    if slave.device.state != state
+                    f"{at} in 0x{device.state:02X}, AL status 0x{device.al_status:04X}"
+                    for at, device in zip(self.names, self._devices, strict=True)
+                    if device.state != state
                 ]
                 raise StateError(
                     "EtherCAT",
@@ -240,20 +200,12 @@ class EthercatFieldbus(Fieldbus):
         self.write(dof, pdos, 1)
         self.verify(dof, count, len(entries))
 
-    def _upload(self, dof: Motor, entry: Entry) -> bytes:
-        device = self._slaves[dof].device
-        return bytes(
-            self._request(dof, entry, lambda: device.sdo_read(entry.index, entry.subindex))
-        )
-
-    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
-        device = self._slaves[dof].device
-        self._request(dof, what, lambda: device.sdo_write(entry.index, entry.subindex, data))
-
-    def _request(self, dof: Motor, what: object, transfer: Callable[[], Any]) -> Any:
-        name = self.name(dof)
+    def _transfer(self, dof: Motor, entry: Entry, what: object, data: bytes | None = None) -> bytes:
+        name, device = self.names[dof], self._devices[dof]
         try:
-            return transfer()
+            if data is None:
+                return bytes(device.sdo_read(entry.index, entry.subindex))
+            device.sdo_write(entry.index, entry.subindex, data)
         except self._soem.SdoError as error:
             raise abort_error(name, what, error.abort_code, error.desc) from None
         except (self._soem.WkcError, self._soem.MailboxError, self._soem.PacketError) as error:
@@ -262,3 +214,4 @@ class EthercatFieldbus(Fieldbus):
                 f"no answer to an SDO request for {what} ({error})",
                 "Check its supply and cables",
             ) from None
+        return b""

@@ -18,7 +18,6 @@ from tautscope.loop.safety import Reaction, Supervision
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import check_free
 
-RigMaker = Callable[[Config], HardwareRig]
 _LOG = logging.getLogger(__name__)
 
 
@@ -29,20 +28,16 @@ def run_on_hardware(
     reference: Reference | None = None,
     *,
     compare: bool = False,
-    make_rig: RigMaker = HardwareRig,
+    make_rig: Callable[[Config], HardwareRig] = HardwareRig,
 ) -> HardwareRun:
     """Run a reference on the configured drives and camera, and log every run.
 
     The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
     A run that is refused before the loop begins leaves no log and no folder.
 
-    Args:
-        config: With a section ``drives``.
-        folder: New or empty; the log is written there from the start.
-        progress: Called with the fraction of the work done, 0 to 1.
-        reference: By default the article's protocol.
-        compare: Run without compensation first, to compute the reduction.
-        make_rig: Makes the rig.
+    The log is written to `folder`, which is new or empty, from the start. `progress` is called with
+    the fraction of the work done. The reference is by default the article's protocol; with
+    `compare` a run without compensation comes first, to compute the reduction.
 
     Raises:
         ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`. The drives
@@ -114,11 +109,7 @@ def _run(
 
 
 def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
-    """Apply the supervisor's reaction to the drives, in the tick in which it is decided.
-
-    Raises:
-        DriveError: The reaction is a quick stop or disable.
-    """
+    """Apply a quick stop or disable to the drives, in the tick of the decision, and raise it."""
     reaction = supervision.reaction
     if reaction.rank < Reaction.QUICK_STOP.rank:
         return

@@ -34,11 +34,7 @@ def abort_error(name: str, what: object, code: int, text: object) -> SettingRefu
 
 
 def require_waived(config: DrivesConfig, entry: Entry, error: SettingRefusedError) -> None:
-    """Raise the error with its waiver as remedy, unless the object is waived.
-
-    Raises:
-        SettingRefusedError: The object is not waived.
-    """
+    """Raise the error with its waiver as remedy, unless the object is waived."""
     waiver = next((name for name in WAIVERS if name == f"{entry.index:04X}"), None)
     if waiver is None:
         raise error
@@ -52,19 +48,16 @@ class Fieldbus(ABC):
 
     Every method may raise `tautscope.errors.DriveError`: the bus is lost, or a drive does not
     answer, has sent an emergency object or no heartbeat.
+
+    Attributes:
+        names: The drives' names for messages: DOF and node.
     """
 
-    @abstractmethod
-    def name(self, dof: Motor) -> str:
-        """The drive's name for messages: DOF and node."""
+    names: Sequence[str]
 
     def read(self, dof: Motor, entry: Entry) -> int:
-        """Read a value from a drive's object dictionary.
-
-        Raises:
-            AbsentError: The drive lacks the object.
-        """
-        return entry.decode(self._upload(dof, entry))
+        """Read a value from a drive's object dictionary; `AbsentError` if the drive lacks it."""
+        return entry.decode(self._transfer(dof, entry, entry))
 
     def read_or_zero(self, dof: Motor, entry: Entry) -> int:
         """`read`; 0 if the drive lacks the object."""
@@ -85,23 +78,19 @@ class Fieldbus(ABC):
             data = value.to_bytes(size, "little", signed=entry.signed)
         except OverflowError:
             raise SettingRefusedError(
-                self.name(dof),
+                self.names[dof],
                 f"{entry} cannot hold {value} in {size} bytes",
                 "Check counts_per_unit and speed_limit of this motor, and its EDS file if it has "
                 "one",
             ) from None
-        self._download(dof, entry, data, f"{entry} = {value}")
+        self._transfer(dof, entry, f"{entry} = {value}", data)
 
     def verify(self, dof: Motor, entry: Entry, value: int) -> None:
-        """Read a setting back.
-
-        Raises:
-            SettingRefusedError: The drive holds another value.
-        """
+        """Read a setting back; `SettingRefusedError` if the drive holds another value."""
         found = self.read(dof, entry)
         if found != value:
             raise SettingRefusedError(
-                self.name(dof),
+                self.names[dof],
                 f"{entry} was set to {value} (0x{value:X}) and reads back {found} (0x{found:X})",
                 "Look up in its manual which values it accepts, and in which state",
             )
@@ -138,12 +127,8 @@ class Fieldbus(ABC):
         return entry.size
 
     @abstractmethod
-    def _upload(self, dof: Motor, entry: Entry) -> bytes:
-        """Read a value by SDO upload."""
-
-    @abstractmethod
-    def _download(self, dof: Motor, entry: Entry, data: bytes, what: str) -> None:
-        """Write a value by SDO download; `what` is for errors."""
+    def _transfer(self, dof: Motor, entry: Entry, what: object, data: bytes | None = None) -> bytes:
+        """Write a value by SDO download, or without `data` read it; `what` is for errors."""
 
 
 def target_object(mode: Mode) -> Entry:

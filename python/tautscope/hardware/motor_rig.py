@@ -48,6 +48,7 @@ class MotorRig:
         config: With a section ``drives``.
 
     Attributes:
+        control_period: Time from one command to the next [s].
         timing: Timing of the set-points and frames since `reset`.
         warn: Called once when a problem begins that does not stop the run, and when it ends.
 
@@ -58,6 +59,7 @@ class MotorRig:
     def __init__(self, config: Config) -> None:
         self._drives = require_drives(config)
         self._config = config
+        self.control_period = self._drives.cycle
         self.warn: Callable[[str], None] = _LOG.warning
         self.timing = Timing(self._drives.cycle)
         self._resources = ExitStack()
@@ -69,11 +71,6 @@ class MotorRig:
     def __repr__(self) -> str:
         state = "closed" if self._setpoints is None else f"open, {self._ticks} cycles"
         return f"<{type(self).__name__}: cycle {1e3 * self._drives.cycle:g} ms, {state}>"
-
-    @property
-    def control_period(self) -> float:
-        """Time from one command to the next [s]."""
-        return self._drives.cycle
 
     @property
     def start(self) -> NDArray[np.float64] | None:

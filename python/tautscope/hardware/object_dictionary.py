@@ -6,14 +6,10 @@ The table replaces the EDS file of a drive where the configuration names none.
 from dataclasses import dataclass
 from typing import Literal
 
-Access = Literal["ro", "rw", "const"]
-
-SIGNED = {1: 0x02, 2: 0x03, 4: 0x04}
-"""CiA 301 data type by length in bytes: INTEGER8, INTEGER16, INTEGER32."""
-UNSIGNED = {1: 0x05, 2: 0x06, 4: 0x07}
-"""CiA 301 data type by length in bytes: UNSIGNED8, UNSIGNED16, UNSIGNED32."""
-SIZES = {number: size for types in (SIGNED, UNSIGNED) for size, number in types.items()}
-"""Length in bytes by CiA 301 data type."""
+_TYPES = {(1, True): 2, (2, True): 3, (4, True): 4, (1, False): 5, (2, False): 6, (4, False): 7}
+"""CiA 301 data type of an integer by its length [byte] and whether it is signed."""
+SIZES = {number: size for (size, _), number in _TYPES.items()}
+"""Length [byte] by CiA 301 data type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +17,7 @@ class Entry:
     """One value of a drive's object dictionary.
 
     Attributes:
-        index, subindex: Its address.
-        name: Its name in the standard.
         size: Length [byte].
-        signed: Whether the integer is signed.
-        access: ``rw``, ``ro`` or ``const``.
         default: Its value after power-on.
         mappable: Whether a PDO can carry it.
     """
@@ -35,7 +27,7 @@ class Entry:
     name: str
     size: Literal[1, 2, 4]
     signed: bool = False
-    access: Access = "rw"
+    access: Literal["ro", "rw", "const"] = "rw"
     default: int = 0
     mappable: bool = False
 
@@ -45,7 +37,7 @@ class Entry:
     @property
     def data_type(self) -> int:
         """Number of the data type in CiA 301."""
-        return (SIGNED if self.signed else UNSIGNED)[self.size]
+        return _TYPES[self.size, self.signed]
 
     @property
     def mapping(self) -> int:
@@ -53,11 +45,7 @@ class Entry:
         return self.index << 16 | self.subindex << 8 | self.size * 8
 
     def encode(self, value: int) -> bytes:
-        """Encode a value as little-endian bytes.
-
-        Raises:
-            OverflowError: The value does not fit.
-        """
+        """Encode a value as little-endian bytes; `OverflowError` if it does not fit."""
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, data: bytes) -> int:
@@ -103,8 +91,9 @@ INTERPOLATION_BUFFER_CLEAR = Entry(0x60C4, 6, "Buffer clear", 1)
 SUPPORTED_MODES = Entry(0x6502, 0, "Supported drive modes", 4, access="ro", default=0xC0)
 
 
-def pdo_entries(base: int, mapping: int, cob: int, name: str) -> tuple[Entry, ...]:
+def pdo_entries(base: int, cob: int = 0) -> tuple[Entry, ...]:
     """Communication and mapping parameters of one PDO with four mapped objects."""
+    mapping, name = base + 0x200, f"PDO 0x{base:04X}"
     return (
         Entry(base, 1, f"{name} COB-ID", 4, default=cob),
         Entry(base, 2, f"{name} transmission type", 1, default=255),
@@ -115,14 +104,6 @@ def pdo_entries(base: int, mapping: int, cob: int, name: str) -> tuple[Entry, ..
 
 def device_profile(node: int) -> tuple[Entry, ...]:
     """Every object of a drive with a node id."""
-    pdos = [
-        (kind, number, base + number, base + 0x200 + number, cob + number * 0x100 + node)
-        for kind, base, cob in (("Receive PDO", 0x1400, 0x200), ("Transmit PDO", 0x1800, 0x180))
-        for number in range(2)
-    ]
     single = tuple(value for value in globals().values() if isinstance(value, Entry))
-    return single + tuple(
-        entry
-        for kind, number, base, mapping, cob in pdos
-        for entry in pdo_entries(base, mapping, cob, f"{kind} {number + 1}")
-    )
+    pdos = ((0x1400, 0x200), (0x1401, 0x300), (0x1800, 0x180), (0x1801, 0x280))
+    return single + tuple(entry for base, cob in pdos for entry in pdo_entries(base, cob + node))

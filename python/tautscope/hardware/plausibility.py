@@ -131,18 +131,13 @@ class PlausibilityMonitor:
         tip_moved, motor_moved = (display_text([each], [dof]) for each in (tip, motor))
         moved = f"a tip that moved {tip_moved} while its motor moved {motor_moved}"
         if tip < -MAX_REVERSE_MOTION * scale:
-            raise ConfigError(
-                f"{name}.sign", moved, "motion in the same direction: the sign is wrong"
-            )
+            allowed = "motion in the same direction: the sign is wrong"
+            raise ConfigError(f"{name}.sign", moved, allowed)
         if tip > MAX_GAIN * (motor + scale):
-            raise ConfigError(
-                f"{name}.counts_per_unit", moved, "counts per m or rad: the value is too large"
-            )
+            allowed = "counts per m or rad: the value is too large"
+            raise ConfigError(f"{name}.counts_per_unit", moved, allowed)
         if motor - tip > MAX_LOST_MOTION * scale:
-            raise ConfigError(
-                f"{name}.counts_per_unit",
-                moved,
-                f"a tip that follows: the value or {dof.label}.start_deviation is too small, "
-                f"{name}.sign is wrong, or the transmission is broken",
-            )
+            allowed = f"a tip that follows: the value or {dof.label}.start_deviation is too small, "
+            allowed += f"{name}.sign is wrong, or the transmission is broken"
+            raise ConfigError(f"{name}.counts_per_unit", moved, allowed)
         self._has_passed[dof] = motor > SUFFICIENT_RANGE * scale

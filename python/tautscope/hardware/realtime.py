@@ -26,11 +26,7 @@ _SWITCH_INTERVAL = 5e-4
 
 @contextmanager
 def realtime(priority: int) -> Iterator[str]:
-    """Run the block in SCHED_FIFO; threads that it starts inherit the priority.
-
-    Yields:
-        Empty if it was granted, else the reason and the remedy.
-    """
+    """Run the block and its threads in SCHED_FIFO; yields "", or why not and the remedy."""
     if not hasattr(os, "sched_setscheduler"):
         yield f"{sys.platform} has no SCHED_FIFO; set-points may be late under load"
         return
@@ -99,9 +95,7 @@ def locked_memory() -> Iterator[str]:
     """Lock the pages that this process has touched in memory for the block (mlockall).
 
     Otherwise rarely used code, such as a quick stop, may have to be paged in from a busy disk.
-
-    Yields:
-        Empty if it was granted, else the reason and the remedy.
+    Yields as `realtime`.
     """
     if sys.platform != "linux":
         yield f"{sys.platform}: memory cannot be locked"
@@ -118,10 +112,6 @@ def locked_memory() -> Iterator[str]:
 
 @contextmanager
 def realtime_process(priority: int) -> Iterator[str]:
-    """Run the block in SCHED_FIFO, with locked memory and limited garbage collection.
-
-    Yields:
-        What `realtime` yields.
-    """
+    """`realtime` with locked memory and limited garbage collection."""
     with limited_garbage_collection(), locked_memory(), realtime(priority) as refusal:
         yield refusal

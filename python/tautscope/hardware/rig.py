@@ -7,7 +7,6 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, CameraState, Capture
@@ -27,13 +26,10 @@ class HardwareRig(MotorRig):
         ConfigError: As of `MotorRig`.
     """
 
-    def __init__(self, config: Config) -> None:
-        super().__init__(config)
-        self._camera: Camera | None = None
-        self._last_capture: Capture | None = None
-        self._new_frame_at = 0.0
-        self._trouble = ""
-        self._is_frozen = False
+    _camera: Camera | None = None
+    _last_capture: Capture | None = None
+    _new_frame_at = 0.0
+    _trouble, _is_frozen = "", False
 
     @property
     def start(self) -> NDArray[np.float64]:
@@ -60,11 +56,6 @@ class HardwareRig(MotorRig):
         _LOG.info("camera %s: frames arrive", self._config.camera.source.url)
 
     def _sample(self, time: float, applied: NDArray[np.float64]) -> Sample:
-        """The sample of a cycle.
-
-        Raises:
-            CameraError: No new frame came for ``camera.source.lost_timeout``.
-        """
         assert self._camera is not None
         return Sample(time, applied, self._newest_frame(self._camera))
 

@@ -21,9 +21,6 @@ class RigLock:
     A context manager; `release` may be called twice. On Windows it locks nothing: there, as for
     programs on other computers, foreign frames on the bus end in a quick stop.
 
-    Args:
-        config: Its protocol, interface and channel name the bus.
-
     Raises:
         SecondMasterError: Another program has the lock.
     """

@@ -12,18 +12,12 @@ from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary
 from tautscope.report.recorded_run import RecordedRun
 from tautscope.report.tables import finite_or_none
-from tautscope.runs.recording import Recording, Table
+from tautscope.runs.recording import Recording
 
 
 @dataclass(frozen=True)
 class ProtocolRun:
-    """One run of the protocol.
-
-    Attributes:
-        recording: Traces of the loop.
-        timing: Timing of set-points and frames.
-        log: Summary of its log.
-    """
+    """One run of the protocol."""
 
     recording: Recording
     timing: Timing
@@ -32,13 +26,7 @@ class ProtocolRun:
 
 @dataclass(frozen=True)
 class HardwareRun:
-    """Results of ``tautscope run``.
-
-    Attributes:
-        config: The configuration used.
-        compensated: The run with compensation.
-        uncompensated: The run without compensation, if it was requested.
-    """
+    """Results of ``tautscope run``."""
 
     config: Config
     compensated: ProtocolRun
@@ -93,16 +81,12 @@ def _summary(run: ProtocolRun) -> dict[str, Any]:
         "log_complete": run.log.is_complete,
         "ticks": len(run.recording.trace),
         "status": dict(Counter(frames["status"].tolist())),
-        "observable": _observable_fractions(frames),
+        "observable": {
+            dof.label: finite_or_none(float(frames[f"observable_{dof.label}"].mean()))
+            if len(frames)
+            else None
+            for dof in Dof
+        },
         "timing": run.timing.summary(),
         "warnings": list(run.recording.warnings),
-    }
-
-
-def _observable_fractions(frames: Table) -> dict[str, float | None]:
-    return {
-        dof.label: finite_or_none(float(frames[f"observable_{dof.label}"].mean()))
-        if len(frames)
-        else None
-        for dof in Dof
     }

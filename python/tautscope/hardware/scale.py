@@ -12,11 +12,7 @@ from tautscope.errors import SignalError
 class Scale:
     """Conversion of one DOF between SI units and encoder counts.
 
-        x = home + sign counts / counts_per_unit
-
-    Attributes:
-        axis: Units, sign, home and limits.
-        dof: The motor, for errors.
+    x = home + sign counts / counts_per_unit
     """
 
     axis: AxisConfig

@@ -1,5 +1,6 @@
 """Serial numbers of the camera and the drives of a rig."""
 
+from contextlib import closing
 from pathlib import Path
 
 from tautscope.config import CameraConfig, Config
@@ -24,21 +25,13 @@ def camera_serial_number(config: CameraConfig) -> dict[str, str]:
 
 
 def read_serial_numbers(config: Config) -> dict[str, str]:
-    """The serial numbers of camera and drives of a configuration, where they have one.
-
-    Raises:
-        ConfigError: The section ``drives`` is missing.
-        DriveError: A drive does not answer.
-    """
+    """The serial numbers of camera and drives of a configuration, where they have one."""
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
-    group = open_group(config.drives)
-    try:
+    with closing(open_group(config.drives)) as group:
         drives = {
             motor.label: number
             for motor in config.drives.all_motors
             if (number := group.serial_number(motor))
         }
-    finally:
-        group.close()
     return camera_serial_number(config.camera) | drives

@@ -26,7 +26,8 @@ class SetpointThread:
     The cycles lie on a fixed time grid. A command that is late for one cycle is sent in the next,
     and the last set-point is repeated meanwhile; a cycle for which the thread wakes too late is
     skipped. Lost cycles are not caught up. The motors are quick-stopped without a command for
-    ``command_timeout`` and when the main thread ends.
+    ``command_timeout`` and when the main thread ends. `start` and `send` raise what the drives
+    raise, whose motors are then stopped, and `StateError` after a stop.
 
     Args:
         config: Cycle, limits, timeouts.
@@ -57,11 +58,7 @@ class SetpointThread:
         self._thread = threading.Thread(target=self._run, name="set-points")
 
     def start(self) -> Floats:
-        """Move to the start; the positions reached (n,) [m or rad].
-
-        Raises:
-            TautscopeError: The drives failed; the motors are stopped.
-        """
+        """Move to the start; the positions reached (n,) [m or rad]."""
         self._thread.start()
         with self._condition:
             return self._wait_for_answer()[1]
@@ -71,10 +68,6 @@ class SetpointThread:
 
         Returns:
             Time at which it was sent [s, monotonic clock], and the positions (n,) [m or rad].
-
-        Raises:
-            StateError: The thread has stopped.
-            TautscopeError: The drives failed; the motors are stopped.
         """
         with self._condition:
             self._command = command

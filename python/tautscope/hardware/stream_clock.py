@@ -18,9 +18,6 @@ class StreamClock:
 
     A constant delay must be configured. A drift of 1 s per day makes an error of 0.1 ms in a window
     of 10 s.
-
-    Args:
-        source: `clock`, `clock_window` and `delay` are used.
     """
 
     def __init__(self, source: SourceConfig) -> None:

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-CYCLE_COLUMNS = ("due", "began", "ended", "new")
-FRAME_COLUMNS = ("captured", "arrived", "used")
-
 
 @dataclass
 class Timing:
@@ -92,12 +89,12 @@ class Timing:
 
     def write(self, folder: Path, suffix: str = "") -> None:
         """Write timing_cycles.csv and timing_frames.csv; `suffix` is appended to their names."""
-        for name, table, columns in (
-            ("cycles", self.cycles, CYCLE_COLUMNS),
-            ("frames", self.frames, FRAME_COLUMNS),
+        for name, table, header in (
+            ("cycles", self.cycles, "due,began,ended,new"),
+            ("frames", self.frames, "captured,arrived,used"),
         ):
             file = folder / f"timing_{name}{suffix}.csv"
-            np.savetxt(file, table, "%.6f", ",", header=",".join(columns), comments="")
+            np.savetxt(file, table, "%.6f", ",", header=header, comments="")
 
     def summary(self) -> dict[str, Any]:
         """Statistics for JSON; times in ms."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,14 +51,8 @@ _TURNS = {
 """Angle by which a player turns the frames, counterclockwise -> FFmpeg's filters."""
 
 
-@dataclass(frozen=True, slots=True)
-class DecodedFrame:
-    """A decoded frame, or a field converted to a frame.
-
-    Attributes:
-        image: In the format `camera.pixel_format`.
-        stamp: Time stamp of the source [s]; None if it has none.
-    """
+class DecodedFrame(NamedTuple):
+    """A frame or field in `camera.pixel_format`, and the source's time stamp [s], if it has one."""
 
     image: Image
     stamp: float | None
@@ -75,7 +68,6 @@ def open_source(
     """Open a source for the block.
 
     Raises:
-        MissingExtraError: PyAV is not installed.
         CameraMismatchError: The source has no video.
         CameraError: The source cannot be opened or read.
         NoRigError: It is the socket of a bench that is not running.
@@ -105,7 +97,6 @@ def open_video_file(path: str) -> Iterator[InputContainer]:
     """Open a video file for the block. Errors of the block are of an input, not of a rig.
 
     Raises:
-        MissingExtraError: PyAV is not installed.
         MissingPathError: The file does not exist.
         CameraError: It is no video.
     """
@@ -123,10 +114,6 @@ class Decoder:
     """Decodes the video of an open source into images of the configured size and format.
 
     Frames are turned as the source says. A damaged one is left out: FFmpeg would fill its gaps.
-
-    Args:
-        container: From `open_source`.
-        camera: Its size, pixel format and ``source.deinterlace`` are used.
 
     Attributes:
         is_interlaced: Whether the source is interlaced; None before the first frame.
@@ -208,12 +195,6 @@ class Decoder:
             yield self._convert(field)  # type: ignore[arg-type]  # a video graph gives video
 
     def _convert(self, frame: av.VideoFrame) -> DecodedFrame:
-        self._check_size(frame)
-        return DecodedFrame(
-            _pixels(frame, _FORMATS[self._camera.pixel_format], self._shape), frame.time
-        )
-
-    def _check_size(self, frame: av.VideoFrame) -> None:
         camera = self._camera
         if (frame.width, frame.height) != (camera.width, camera.height):
             raise CameraMismatchError(
@@ -222,6 +203,7 @@ class Decoder:
                 f"camera.width x height = {camera.width} x {camera.height}, as calibrated; set "
                 "camera.source.options.video_size, or calibrate for this size",
             )
+        return DecodedFrame(_pixels(frame, _FORMATS[camera.pixel_format], self._shape), frame.time)
 
 
 def read_video(path: str, camera: CameraConfig, start: float = 0.0) -> Iterator[Frame]:
@@ -262,12 +244,8 @@ def _graph(stream: VideoStream, filters: tuple[tuple[str, str], ...]) -> Graph:
     from av.filter import Graph  # noqa: PLC0415
 
     graph = Graph()
-    last = graph.add_buffer(template=stream)
-    for name, arguments in (*filters, ("buffersink", "")):
-        following = graph.add(name, arguments or None)
-        last.link_to(following)
-        last = following
-    graph.configure()
+    made = (graph.add(name, arguments or None) for name, arguments in filters)
+    graph.link_nodes(graph.add_buffer(template=stream), *made, graph.add("buffersink")).configure()
     return graph
 
 

@@ -1,6 +1,6 @@
 """Results of checks, for people and for scripts."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from tautscope.errors import DriveError, FieldError, TautscopeError
@@ -28,10 +28,6 @@ class CheckResult:
     found: str
     todo: str = ""
     data: dict[str, Any] = field(default_factory=dict)
-
-    def to_json(self) -> dict[str, Any]:
-        """The attributes as a dictionary."""
-        return asdict(self)
 
 
 def result(

@@ -100,7 +100,6 @@ def _extra(name: str) -> CheckResult:
 def _permission(
     what: str, setting: AbstractContextManager[str], granted: str, refused: str, status: Status
 ) -> CheckResult:
-    """Try a setting that the system may refuse."""
     with setting as refusal:
         if not refusal:
             return CheckResult("computer", what, "ok", granted)

@@ -77,7 +77,7 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
             try:
                 settings.append(_settings(group.commission(dof), config))
             except DriveError as error:
-                settings.append(from_error("drives", f"{group.name(dof)}: settings", error))
+                settings.append(from_error("drives", f"{group.names[dof]}: settings", error))
         findings += settings
         if all(finding.status != "missing" for finding in settings):
             group.configure()
@@ -115,7 +115,7 @@ def _check_latency(config: DrivesConfig) -> list[CheckResult]:
 
 def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckResult:
     """Read state and position of one drive without writing to it."""
-    what = group.name(dof)
+    what = group.names[dof]
     try:
         status = group.status(dof)
     except DriveError as error:
@@ -164,7 +164,7 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
         late += sum(one.age > 0 for one in feedback)
         answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
-    silent = [group.name(dof) for dof in config.all_motors if not answers[dof]]
+    silent = [group.names[dof] for dof in config.all_motors if not answers[dof]]
     what = "answers" if config.protocol in SERIAL_PORTS else "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:

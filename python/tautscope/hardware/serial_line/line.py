@@ -17,12 +17,7 @@ _WRITE_TIMEOUT = 0.1
 
 
 def open_port(config: DrivesConfig) -> Any:
-    """Open the port.
-
-    Raises:
-        MissingExtraError: The library is not installed.
-        BusError: The port cannot be opened, or another program has it.
-    """
+    """Open the port, which no other program may have."""
     require_extras("A serial line", ["hardware"])
     import serial  # noqa: PLC0415
 
@@ -56,17 +51,13 @@ def _keep_running(file: int) -> None:
 
 
 class SerialLine:
-    """Requests and answers on an open port.
-
-    Args:
-        port: A `serial.Serial`, which is closed with it.
-        channel: Its name, for messages.
+    """Requests and answers on a `serial.Serial`, which is closed with it.
 
     Every method raises `BusError` if the port is lost.
     """
 
     def __init__(self, port: Any, channel: str) -> None:
-        self._port, self._name = port, f"microcontroller on {channel}"
+        self._port, self.name = port, f"microcontroller on {channel}"
         self._buffer = bytearray()
         self._number = 0
 
@@ -98,7 +89,7 @@ class SerialLine:
 
     def _lost(self, error: OSError) -> BusError:
         return BusError(
-            self._name,
+            self.name,
             f"the connection is lost: {error}",
             "Check the cable and the microcontroller's supply, then start again",
         )

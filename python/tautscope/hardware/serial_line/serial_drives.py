@@ -40,11 +40,7 @@ _FAULT = f"Find the cause, then {RESET}"
 
 
 class SerialDrives(DriveGroup):
-    """Motors behind a microcontroller.
-
-    Args:
-        config: Axes, limits and timeouts.
-        port: The open port, which is closed with them.
+    """Motors behind a microcontroller on an open port, which is closed with them.
 
     Raises:
         BusError: No microcontroller answers.
@@ -52,9 +48,11 @@ class SerialDrives(DriveGroup):
     """
 
     def __init__(self, config: DrivesConfig, port: Any) -> None:
-        super().__init__(config)
-        self._name = f"microcontroller on {config.channel}"
         self._line = SerialLine(port, config.channel)
+        names = [f"{dof.label}, axis {config[dof].node}" for dof in config.all_motors]
+        super().__init__(config, names, self._line.close)
+        self._at = [config[dof].node - 1 for dof in config.all_motors]
+        """Index of each motor among the axes of the microcontroller."""
         self._targets: list[int] = []
         try:
             self._axes = self._greet().axes
@@ -62,17 +60,9 @@ class SerialDrives(DriveGroup):
             self.close()
             raise
 
-    def name(self, dof: Motor) -> str:
-        """See `DriveGroup.name`."""
-        return f"{dof.label}, axis {self._config[dof].node}"
-
     def status(self, dof: Motor) -> DriveStatus:
-        """Read state, fault and position.
-
-        Raises:
-            SettingRefusedError: There is no such axis.
-        """
-        limits, at = self._limits(dof), self._config[dof].node - 1
+        """Read state, fault and position."""
+        limits, at = self._limits(dof), self._at[dof]
         status = self._ask(Request.READ)
         fault, state = status.faults[at], _state(status.state)
         found = f"{state}; {_fault_name(fault) if fault else 'no fault'}; {limits.lower} to "
@@ -94,24 +84,23 @@ class SerialDrives(DriveGroup):
         lower, upper = scale.travel_counts()
         if lower < limits.lower or upper > limits.upper:
             raise SettingRefusedError(
-                self.name(dof),
+                self.names[dof],
                 f"{dof.key}.travel is {lower} to {upper} counts, and the microcontroller "
                 f"takes {limits.lower} to {limits.upper}",
                 "Correct travel, home or counts_per_unit, or the limits in its program",
             )
         if (speed := scale.speed_counts()) > limits.speed:
             raise SettingRefusedError(
-                self.name(dof),
+                self.names[dof],
                 f"{dof.key}.speed_limit is {speed} counts/s, and the microcontroller "
                 f"reaches {limits.speed}",
                 f"Lower {dof.key}.speed_limit, or let a step be a larger motion",
             )
-        return CommissionedDrive(self.name(dof), 0, 0, 0, limits._asdict())
+        return CommissionedDrive(self.names[dof], 0, 0, 0, limits._asdict())
 
     def read_positions(self) -> list[int]:
         """Read the positions."""
-        status = self._ask(Request.READ)
-        return [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
+        return self._positions(self._ask(Request.READ))
 
     def probe(self) -> list[Feedback]:
         """Read all axes once."""
@@ -125,7 +114,7 @@ class SerialDrives(DriveGroup):
             status = self._ask(Request.DISABLE)
         self._check_faults(status, StateError)
         if status.state == State.FAULT:
-            raise StateError(self._name, "a fault has stopped it", _FAULT)
+            raise StateError(self._line.name, "a fault has stopped it", _FAULT)
         self._was_enabled = self._is_moving = True
         if status.state == State.ENABLED:
             # Left by a killed host: it may still move, with that host's watchdog time.
@@ -135,23 +124,17 @@ class SerialDrives(DriveGroup):
         if status.state != State.ENABLED:
             self._check_faults(status, StateError)
             what = f"it stays {_state(status.state)}{_why(status.refusal)}"
-            raise StateError(self._name, what, "Check its program; power-cycle it")
+            raise StateError(self._line.name, what, "Check its program; power-cycle it")
         self._targets = list(status.positions)
-        targets = [status.positions[self._config[dof].node - 1] for dof in self._config.all_motors]
+        targets = self._positions(status)
         self.start(targets)
         return self.exchange(targets)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
-        """Send the set-points, read the positions.
-
-        Raises:
-            StateError: It refused set-points, restarted, or stopped for lack of set-points.
-            EmergencyError: A motor has a fault.
-            BusError: The port is lost.
-        """
-        self._check_pause(self._name)
-        for dof, target in zip(self._config.all_motors, targets, strict=True):
-            self._targets[self._config[dof].node - 1] = target
+        """Send the set-points, read the positions, check state and faults."""
+        self._check_pause(self._line.name)
+        for at, target in zip(self._at, targets, strict=True):
+            self._targets[at] = target
         self._receive(self._line.send(Request.SETPOINTS, frames.setpoints(self._targets)))
         return self._feedback
 
@@ -162,10 +145,6 @@ class SerialDrives(DriveGroup):
 
     def _switch_off(self) -> list[str]:
         return self._command(Request.DISABLE)
-
-    def close(self) -> None:
-        """Release the port; a second call does nothing."""
-        self._line.close()
 
     def _greet(self) -> Hello:
         """Repeat hello until it is answered: opening the port may restart an Arduino."""
@@ -178,30 +157,32 @@ class SerialDrives(DriveGroup):
                     continue
                 if hello.version != frames.VERSION:
                     raise ModeRefusedError(
-                        self._name,
+                        self._line.name,
                         f"it speaks version {hello.version} of the protocol, and this program "
                         f"version {frames.VERSION}",
                         "Load a program with the header of this version (arduino)",
                     )
                 return hello
         raise SilentDriveError(
-            self._name,
+            self._line.name,
             f"no answer for {_START:g} s",
             "Check drives.channel, drives.bitrate, its supply, and that a program which speaks "
             "docs/serial.md is loaded",
         )
 
     def _limits(self, dof: Motor) -> Limits:
-        if self._config[dof].node > len(self._axes):
+        if self._at[dof] >= len(self._axes):
             raise SettingRefusedError(
-                self.name(dof),
+                self.names[dof],
                 f"the microcontroller has {len(self._axes)} axes",
                 f"Correct {dof.key}.node",
             )
-        return self._axes[self._config[dof].node - 1]
+        return self._axes[self._at[dof]]
+
+    def _positions(self, status: frames.Status) -> list[int]:
+        return [status.positions[at] for at in self._at]
 
     def _ask(self, kind: Request, body: bytes = b"", timeout: float | None = None) -> frames.Status:
-        """Repeat a request until it is answered."""
         deadline = time.monotonic() + (timeout or self._config.request_timeout)
         while (now := time.monotonic()) < deadline:
             number = self._line.send(kind, body)
@@ -209,7 +190,7 @@ class SerialDrives(DriveGroup):
                 status = frames.read_status(message, len(self._axes))
                 if status is not None and status.number == number:
                     return status
-        raise SilentDriveError(self._name, "no answer", "Check its supply and cable")
+        raise SilentDriveError(self._line.name, "no answer", "Check its supply and cable")
 
     def _command(self, kind: Request) -> list[str]:
         """Carry out a request that stops the motors; names of those that may be moving."""
@@ -218,7 +199,7 @@ class SerialDrives(DriveGroup):
                 return []
         except DriveError:
             pass  # silent, or the port is lost
-        return [self.name(dof) for dof in self._config.all_motors]
+        return list(self.names)
 
     def _receive(self, number: int) -> None:
         """Wait for an answer; late ones to earlier requests count too."""
@@ -230,9 +211,8 @@ class SerialDrives(DriveGroup):
         for status in answers:
             if status is None:
                 continue
-            for dof, one in zip(self._config.all_motors, self._feedback, strict=True):
-                one.position = status.positions[self._config[dof].node - 1]
-                one.silence, one.answered_at = 0.0, now
+            for position, one in zip(self._positions(status), self._feedback, strict=True):
+                one.position, one.silence, one.answered_at = position, 0.0, now
                 one.answers += 1
                 one.age = one.age if status.number != number else 0
             if self._is_moving:
@@ -241,23 +221,22 @@ class SerialDrives(DriveGroup):
     def _check(self, status: frames.Status) -> None:
         self._check_faults(status, EmergencyError)
         if status.state == State.SILENCE:
-            raise paused(self._name, self._config, time.monotonic() - self._sent_at)
+            raise paused(self._line.name, self._config, time.monotonic() - self._sent_at)
         if status.state != State.ENABLED:
             raise StateError(
-                self._name,
+                self._line.name,
                 f"it is {_state(status.state)}",
                 "If it restarted, it has forgotten its positions: check its supply, and "
                 "drives.*.home",
             )
         if status.refusal:
             what = f"it does not carry out set-points{_why(status.refusal)}"
-            raise StateError(self._name, what, "Check its program")
+            raise StateError(self._line.name, what, "Check its program")
 
     def _check_faults(self, status: frames.Status, error: type[DriveError]) -> None:
         for at, fault in enumerate(status.faults):
             if fault:
-                dofs = [dof for dof in self._config.all_motors if self._config[dof].node == at + 1]
-                name = self.name(dofs[0]) if dofs else f"axis {at + 1}"
+                name = self.names[self._at.index(at)] if at in self._at else f"axis {at + 1}"
                 raise error(name, f"it reports a fault: {_fault_name(fault)}", _FAULT)
 
 

@@ -33,11 +33,7 @@ class Register:
         return f"{self.name} ({self.address})"
 
     def encode(self, value: int) -> bytes:
-        """Encode a value.
-
-        Raises:
-            OverflowError: It does not fit.
-        """
+        """Encode a value; `OverflowError` if it does not fit."""
         if self.sign is None or self.sign < 0:
             return value.to_bytes(self.size, "little", signed=self.sign is not None)
         if abs(value) >= 1 << self.sign:
@@ -72,7 +68,6 @@ class Family:
     Attributes:
         controller: Class of `rustypot`.
         rates: Bit rates at which a search looks, the factory's first [bit/s].
-        torque, goal, position, voltage, temperature, faults, model: Registers.
         fault_names: Bit of `faults` -> name.
         settings: The settings of a motor, for its configuration and speed limit [counts/s].
         mode: Mode of operation: positions of several turns.

@@ -4,14 +4,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from tautscope.config import DrivesConfig
 from tautscope.errors import BusError, SettingRefusedError
 from tautscope.extras import require_extras
 from tautscope.hardware.servos.families import Family, Register
 
-T = TypeVar("T")
 _IDS = range(1, 21)
 """Ids that a search asks."""
 _LOST = re.compile("input/output|broken pipe|no such device|bad file|not configured", re.I)
@@ -35,13 +34,8 @@ class NoAnswerError(Exception):
 class ServoLine:
     """A serial line of servos.
 
-    Args:
-        config: Port, bit rate, timeout.
-        family: The servos on it.
-
-    Raises:
-        MissingExtraError: The library is not installed.
-        BusError: The port cannot be opened, or another program has it.
+    Every method raises `NoAnswerError` if a servo does not answer or the port does not take the
+    packet in time, and `BusError` if the port is lost.
     """
 
     def __init__(self, config: DrivesConfig, family: Family) -> None:
@@ -65,35 +59,24 @@ class ServoLine:
         self._port.set_timeout(timeout)
 
     def read(self, servo: int, register: Register) -> tuple[int, int]:
-        """Read from one servo: value, and the error of its answer.
-
-        Raises:
-            NoAnswerError: It did not answer.
-            BusError: The port is lost.
-        """
-        data, error = self._transfer(
-            lambda: self._port.read_raw_data_with_error(servo, register.address, register.size)
-        )
+        """Read from one servo: value, and the error of its answer."""
+        read = self._port.read_raw_data_with_error
+        data, error = self._transfer(read, servo, register.address, register.size)
         return register.decode(bytes(data)), error
 
     def write(self, servo: int, register: Register, value: int) -> int:
         """Write to one servo; the error of its answer.
 
         Raises:
-            NoAnswerError: It did not answer.
             SettingRefusedError: It refused the value, or the value does not fit.
-            BusError: The port is lost.
         """
         try:
             data = list(register.encode(value))
         except OverflowError:
-            size = f"{register.size} bytes"
-            raise SettingRefusedError(
-                f"servo {servo}", f"{register} cannot hold {value}", f"It has {size}"
-            ) from None
-        error: int = self._transfer(
-            lambda: self._port.write_raw_data_with_error(servo, register.address, data)
-        )
+            what, remedy = f"{register} cannot hold {value}", f"It has {register.size} bytes"
+            raise SettingRefusedError(f"servo {servo}", what, remedy) from None
+        write = self._port.write_raw_data_with_error
+        error: int = self._transfer(write, servo, register.address, data)
         refusal = error & ~self._family.alert if self._family.alert else 0
         if refusal:
             raise SettingRefusedError(
@@ -104,37 +87,19 @@ class ServoLine:
         return error
 
     def read_all(self, servos: Sequence[int], register: Register) -> list[tuple[int, int]]:
-        """Read from several servos with one packet (sync read): values, and the errors.
-
-        Raises:
-            NoAnswerError: One of them did not answer.
-            BusError: The port is lost.
-        """
-        answers = self._transfer(
-            lambda: self._port.sync_read_raw_data_with_error(
-                list(servos), register.address, register.size
-            )
-        )
+        """Read from several servos with one packet (sync read): values, and the errors."""
+        read = self._port.sync_read_raw_data_with_error
+        answers = self._transfer(read, list(servos), register.address, register.size)
         return [(register.decode(bytes(data)), error) for data, error in answers]
 
     def write_all(self, values: Mapping[int, int], register: Register) -> None:
-        """Write to several servos with one packet (sync write), which none answers.
-
-        Raises:
-            NoAnswerError: The port did not take the packet in time.
-            BusError: The port is lost.
-        """
+        """Write to several servos with one packet (sync write), which none answers."""
         data = [list(register.encode(value)) for value in values.values()]
-        self._transfer(lambda: self._port.sync_write_raw_data(list(values), register.address, data))
+        self._transfer(self._port.sync_write_raw_data, list(values), register.address, data)
 
     def reboot(self, servo: int) -> None:
-        """Restart a servo, which forgets its turns and its settings that are not stored.
-
-        Raises:
-            NoAnswerError: It did not answer.
-            BusError: The port is lost.
-        """
-        self._transfer(lambda: self._port.reboot(servo))
+        """Restart a servo, which forgets its turns and its settings that are not stored."""
+        self._transfer(self._port.reboot, servo)
 
     def search(self) -> str:
         """The servos that answer, in words: ids 1 to 20, at the first bit rate with an answer."""
@@ -152,9 +117,9 @@ class ServoLine:
         """Release the port; a second call does nothing."""
         self._port.close()
 
-    def _transfer(self, transfer: Callable[[], T]) -> T:
+    def _transfer(self, transfer: Callable[..., Any], *arguments: Any) -> Any:
         try:
-            return transfer()
+            return transfer(*arguments)
         except (RuntimeError, OSError, ValueError) as error:
             if Path(self._config.channel).exists() and not _LOST.search(str(error)):
                 raise NoAnswerError(str(error)) from None  # late, lost or damaged

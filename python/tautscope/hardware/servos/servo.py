@@ -3,7 +3,7 @@
 import logging
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tautscope.config import DrivesConfig
 from tautscope.config.servos import COUNTS_PER_TURN, MODELS
@@ -20,12 +20,7 @@ _REMEDY = f"Find the cause (load, supply, temperature; docs/hardware.md), then {
 
 
 class Servo:
-    """One servo.
-
-    Args:
-        config: Its settings.
-        dof: The DOF that it moves.
-        line: The open line.
+    """One servo on an open line.
 
     Every method raises `SilentDriveError` if it does not answer, and `BusError` if the port is
     lost.
@@ -43,16 +38,11 @@ class Servo:
 
     def read(self, register: Register) -> int:
         """Read a register."""
-        value, _ = self._ask(lambda: self._line.read(self.id, register))
-        return value
+        return self._ask(self._line.read, self.id, register)[0]
 
     def write(self, register: Register, value: int) -> None:
-        """Write a register; it is not read back.
-
-        Raises:
-            SettingRefusedError: It refused the value.
-        """
-        self._ask(lambda: self._line.write(self.id, register, value))
+        """Write a register; it is not read back."""
+        self._ask(self._line.write, self.id, register, value)
 
     def status(self) -> DriveStatus:
         """Read model, torque, faults, voltage, temperature and position."""
@@ -112,18 +102,14 @@ class Servo:
     def reset_fault(self, before: int) -> int:
         """Restart a Dynamixel; a Feetech clears its faults when the torque is switched off.
 
-        Args:
-            before: Its position [counts].
-
-        Returns:
-            Its position [counts].
+        Its position [counts] was `before`, and is what is returned.
 
         Raises:
             StateError: The fault remains, or it has forgotten its turns.
         """
         family = self._family
         if family.alert:
-            self._ask(lambda: self._line.reboot(self.id))
+            self._ask(self._line.reboot, self.id)
             time.sleep(self._config.state_timeout / 2)
             self.commission()
         else:
@@ -167,15 +153,12 @@ class Servo:
             )
 
     def _wrong_model(self, number: int) -> tuple[str, str]:
-        path = f"{self._dof.key}"
-        return (
-            f"it is a {_model_name(number)}, not a {self._model} ({MODELS[self._model].number})",
-            f"Correct {path}.model or {path}.node",
-        )
+        what = f"it is a {_model_name(number)}, not a {self._model} ({MODELS[self._model].number})"
+        return what, f"Correct {self._dof.key}.model or {self._dof.key}.node"
 
-    def _ask(self, transfer: Callable[[], T]) -> T:
+    def _ask(self, transfer: Callable[..., T], *arguments: Any) -> T:
         try:
-            return transfer()
+            return transfer(*arguments)
         except NoAnswerError:
             remedy = "Check its supply and cable"
             if self.may_search:

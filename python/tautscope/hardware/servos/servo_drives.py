@@ -22,28 +22,16 @@ _WATCHDOG_UNIT = 0.02
 
 
 class ServoDrives(DriveGroup):
-    """Servos on a serial line.
-
-    Args:
-        config: Port, ids, models, limits and timeouts.
-
-    Raises:
-        MissingExtraError: The extra ``servo`` is not installed.
-        BusError: The port cannot be opened.
-    """
+    """Servos on a serial line."""
 
     def __init__(self, config: DrivesConfig) -> None:
-        super().__init__(config)
         self._family = family = FAMILIES[config.protocol]
         self._line = ServoLine(config, family)
         self._servos = [Servo(config, dof, self._line) for dof in config.all_motors]
+        super().__init__(config, [servo.name for servo in self._servos], self._line.close)
         self._ids = [servo.id for servo in self._servos]
         self._goals = [0] * len(config.all_motors)
         self._has_lost_answers = False
-
-    def name(self, dof: Motor) -> str:
-        """See `DriveGroup.name`."""
-        return self._servos[dof].name
 
     def status(self, dof: Motor) -> DriveStatus:
         """See `Servo.status`."""
@@ -95,13 +83,7 @@ class ServoDrives(DriveGroup):
         return self.exchange(self._goals)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
-        """Send the set-points, read the positions.
-
-        Raises:
-            StateError: More than `heartbeat_timeout` passed since the last set-point.
-            EmergencyError: A servo reports a fault.
-            BusError: The port is lost.
-        """
+        """Send the set-points, read the positions, check the faults."""
         self._check_pause(f"servos on {self._config.channel}")
         self._goals = targets
         with suppress(NoAnswerError):  # lost like a set-point on its way; `_receive` counts silence
@@ -141,10 +123,6 @@ class ServoDrives(DriveGroup):
             "check its supply, and where it is (tautscope doctor)"
         )
 
-    def close(self) -> None:
-        """Release the port; a second call does nothing."""
-        self._line.close()
-
     def _command_until(self, register: Register, values: list[int]) -> list[str]:
         """Repeat a sync write until each servo has the value; names of those that do not."""
         pending = set(self._config.all_motors)
@@ -166,7 +144,7 @@ class ServoDrives(DriveGroup):
                         pending.discard(dof)
         except DriveError:
             pass  # the port is lost
-        return [self.name(dof) for dof in sorted(pending)]
+        return [self.names[dof] for dof in sorted(pending)]
 
     def _receive(self) -> None:
         """Read all servos with one packet; one by one in the cycle after one did not answer."""
