@@ -308,6 +308,14 @@ def test_the_adapter_is_released_if_the_line_cannot_be_read(
     assert master.open_on is None
 
 
+def test_an_adapter_that_is_lost_while_a_state_is_awaited_is_named() -> None:
+    soem, master, config = line(stuck_in=PREOP)
+    fieldbus = EthercatFieldbus(config, soem)
+    master.is_unplugged = True
+    with pytest.raises(BusError, match="EtherCAT: the connection is lost: adapter is lost"):
+        Drives(config, Cia402Drives(config, fieldbus))
+
+
 def test_a_stop_that_is_not_confirmed_is_told_though_the_adapter_fails(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

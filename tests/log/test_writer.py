@@ -128,6 +128,10 @@ def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None
     lost = next(index for index in updates if not read.has_image(index))
     with pytest.raises(RecordError, match="an update with its image"):
         read.image(lost)
+    kept = next(index for index in updates if read.has_image(index))
+    (tmp_path / "run.mcap").write_bytes(b"")
+    with pytest.raises(RecordError, match="a file as it was when it was read"):
+        read.image(kept)
 
 
 def test_images_are_lossless_while_that_is_requested(tmp_path: Path, config: Config) -> None:

@@ -11,6 +11,7 @@ import pytest
 from bag_files import (
     START,
     STORAGES,
+    TYPES,
     header,
     joint_state,
     make,
@@ -264,6 +265,17 @@ def test_damage_is_named(how: str, message: str, storage: str, tmp_path: Path) -
     bag = damaged(write_bag(tmp_path / "bag", storage, {"/j": rows}), how, storage)
     with pytest.raises(RecordError, match=message):
         open_table(bag)
+
+
+def test_a_topic_of_two_types_has_the_columns_of_both(tmp_path: Path) -> None:
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        for at, message in ((0, joint_state(0, {"m": 1.0})), (1, pose_stamped(0, (2.0, 3.0, 4.0)))):
+            topic = bag.add_connection("/x", message.__msgtype__, typestore=TYPES)
+            bag.write(topic, START + at, TYPES.serialize_cdr(message, message.__msgtype__))
+    columns, _, _ = list_columns(open_table(tmp_path / "bag"))
+    titles = [column.title for column in columns]
+    assert "/x/m/position" in titles
+    assert "/x/pose/position/x" in titles
 
 
 def test_own_types_are_read_by_their_definition_in_the_bag(tmp_path: Path) -> None:

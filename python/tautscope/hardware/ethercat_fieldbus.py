@@ -149,13 +149,7 @@ class EthercatFieldbus(Fieldbus):
     def _exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
         for device, word, target in zip(self._devices, controlwords, targets, strict=True):
             device.output = _RX_PDO.pack(word, target)
-        try:
-            self._master.send_processdata()
-            counter = self._master.receive_processdata(round(self._config.reply_timeout * 1e6))
-        except (ConnectionError, OSError) as error:
-            raise BusError(
-                "EtherCAT", f"the connection is lost: {error}", "Check the adapter and start again"
-            ) from error
+        counter = self._cycle(round(self._config.reply_timeout * 1e6))
         now = time.monotonic()
         if counter < self._master.expected_wkc:
             self._age += 1
@@ -184,8 +178,18 @@ class EthercatFieldbus(Fieldbus):
                     f"{name} is not reached: " + "; ".join(behind),
                     "Look the AL status code up (ETG.1020)",
                 )
+            self._cycle(2_000)
+
+    def _cycle(self, timeout: int) -> int:
+        """Exchange the process data within a time [us]; the working counter."""
+        try:
             self._master.send_processdata()
-            self._master.receive_processdata(2_000)
+            counter: int = self._master.receive_processdata(timeout)
+        except OSError as error:
+            raise BusError(
+                "EtherCAT", f"the connection is lost: {error}", "Check the adapter and start again"
+            ) from error
+        return counter
 
     def _map(self, dof: Motor, assignment: int, mapping: int, entries: tuple[Entry, ...]) -> None:
         """Map one direction of the process data: invalidate, change, validate."""

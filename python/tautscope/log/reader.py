@@ -1,5 +1,6 @@
 """Reading a log, complete or truncated."""
 
+import itertools
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -118,20 +119,24 @@ class Log:
         """Read the image of an update; exact if `recording.image_format` is lossless.
 
         Raises:
-            RecordError: It is not in the log, or not an image of the configured camera.
+            RecordError: It is not in the log, or not an image of the configured camera; or the file
+                has changed since it was read.
         """
         if index not in self._images:
             raise RecordError(f"{self.path}: image", index, "an update with its image in the log")
         at, channel = self._images[index]
         with self.path.open("rb") as file:
             file.seek(at)
-            _, opcode, payload = next(read_records(file, Damage()))
-        data = next(
+            records = [*itertools.islice(read_records(file, Damage()), 1)]
+        messages = (each for _, opcode, payload in records for each in unpack(opcode, payload))
+        found = (
             message.data
-            for message in unpack(opcode, payload)
+            for message in messages
             if isinstance(message, Message)
             and (message.channel_id, message.sequence) == (channel, index)
         )
+        if (data := next(found, None)) is None:
+            raise RecordError(f"{self.path}: image", index, "a file as it was when it was read")
         codec = ImageCodec(self.config.camera, self.config.recording)
         return codec.decode(topics.decode(topics.IMAGE, data).data.tobytes())
 

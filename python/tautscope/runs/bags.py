@@ -76,7 +76,8 @@ def _read(path: Path) -> tuple[dict[tuple[str, ...], _Rows], dict[str, str]]:
     groups: dict[tuple[str, ...], _Rows] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as bag:
         types = {each.topic: each.msgtype for each in bag.connections}
-        readers = {kind: _reader(bag.typestore, kind) for kind in set(types.values())}
+        kinds = {each.msgtype for each in bag.connections}  # a topic may have several
+        readers = {kind: _reader(bag.typestore, kind) for kind in kinds}
         used = [each for each in bag.connections if readers[each.msgtype] is not None]
         for connection, logged, data in bag.messages(used) if used else ():
             read = readers[connection.msgtype]
