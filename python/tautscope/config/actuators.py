@@ -1,6 +1,7 @@
 """Motors of a robot whose motors are not its degrees of freedom."""
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,16 +77,14 @@ def check_motors(
         names, units = [dof.name for dof in dofs], [str(dof.unit) for dof in dofs]
     elif len(actuators.names) == len(actuators.units) > 0:
         names, units = list(actuators.names), list(actuators.units)
+        matrix = np.abs(actuators.matrix)
+        reach = matrix @ reach if actuators.matrix else np.full(len(names), np.inf)
+        reach += np.abs(actuators.offsets or 0.0)
     else:
         allowed = "names and units of the motors in [drives.motors]"
         raise ConfigError("actuators.names", list(actuators.names), allowed)
     if list(drives.motors) != names:
         raise ConfigError("drives.motors", list(drives.motors), f"in this order {names}")
-    if actuators is not None:
-        reach = (
-            np.abs(actuators.matrix) @ reach if actuators.matrix else np.full(len(names), np.inf)
-        )
-        reach += np.abs(actuators.offsets or 0.0)
     for (name, motor), unit, farthest in zip(drives.motors.items(), units, reach, strict=True):
         if motor.unit != unit:
             raise ConfigError(f"drives.motors.{name}.unit", motor.unit, repr(unit))
@@ -114,9 +113,7 @@ def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry]) -> Non
     rank = int(np.sum(sizes > 1e-9))
     if rank < len(dofs):
         moved = np.abs(directions[rank:]).max(axis=0) > 1e-6
-        names = " and ".join(
-            dof.name for dof, is_moved in zip(dofs, moved, strict=True) if is_moved
-        )
+        names = " and ".join(dof.name for dof in compress(dofs, moved))
         allowed = f"rank {len(dofs)}: the motors do not determine {names}"
         raise ConfigError("actuators.matrix", f"rank {rank}", allowed)
 

@@ -8,7 +8,7 @@ from operator import attrgetter
 
 from msgspec import Struct
 from msgspec.inspect import FloatType, IntType, TupleType, type_info
-from msgspec.structs import fields
+from msgspec.structs import asdict, fields
 
 from tautscope._core import MOST_DOFS
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
@@ -27,19 +27,14 @@ def check_references(
     """Check section ``safety`` against references and estimators."""
     for dof, speed in zip(Dof, safety.reference_speed, strict=True):
         sine = experiment[dof]
-        least_period = 2 * math.pi * sine.amplitude / speed
-        require(
-            sine.period >= least_period or "reference_fast" in safety.off,
-            f"experiment.{dof.label}.period",
-            sine.period,
-            f"at least {least_period:.3g}: safety.reference_speed limits faster references",
-        )
+        least = 2 * math.pi * sine.amplitude / speed
+        is_followed = sine.period >= least or "reference_fast" in safety.off
+        allowed = f"at least {least:.3g}: safety.reference_speed limits faster references"
+        require(is_followed, f"experiment.{dof.label}.period", sine.period, allowed)
     for dof, noise in zip(Dof, safety.state_noise, strict=True):
         tolerance = dofs[dof].contact_tolerance * dofs[dof].update_distance
-        allowed = (
-            f"less than a third of {dof.label}.contact_tolerance times "
-            f"{dof.label}.update_distance = {tolerance:.3g}"
-        )
+        product = f"{dof.label}.contact_tolerance times {dof.label}.update_distance"
+        allowed = f"less than a third of {product} = {tolerance:.3g}"
         require(0 <= 3 * noise < tolerance, f"safety.state_noise[{dof}]", noise, allowed)
 
 
@@ -86,10 +81,9 @@ def check_unused(config: Struct) -> None:
     allowed = f"its default: not used with{'' if has_dofs else 'out'} [[dof]]"
     for section in fields(type(config)):
         if section.name in unused:
-            own, default = getattr(config, section.name), default_of(section)
-            for key in (one.name for one in fields(own)):
-                value = getattr(own, key)
-                require(value == getattr(default, key), f"{section.name}.{key}", value, allowed)
+            own, default = getattr(config, section.name), asdict(default_of(section))
+            for key, value in asdict(own).items():
+                require(value == default[key], f"{section.name}.{key}", value, allowed)
 
 
 _TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")

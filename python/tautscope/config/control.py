@@ -61,8 +61,7 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Vector law of profile ``best``, docs/best.md. All [ours].
 
     Travels are in the unit of each DOF, three quarters of its expected_width, so that one set
-    serves all. delta_minus and delta_plus are those of [insertion],
-    [rotation] and [bending].
+    serves all. delta_minus and delta_plus are those of [insertion], [rotation] and [bending].
     """
 
     free_gain: Gain = 20.0

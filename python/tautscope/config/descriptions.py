@@ -12,11 +12,11 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from itertools import pairwise
+from typing import Any
 
 import msgspec
-import msgspec.inspect
+import msgspec.inspect as types
 
 from tautscope.config.ranges import allowed_values
 from tautscope.config.root import Config
@@ -57,13 +57,11 @@ def section_text(section: type[Section]) -> str:
 def keys(section: type[Section]) -> Iterator[Key]:
     """The keys of a section in the order of their definition, sections last."""
     texts = _docstrings(section.__module__)[section.__name__]
-    hints = get_type_hints(section)
     found = []
     for field in msgspec.structs.fields(section):
-        kind = msgspec.inspect.type_info(field.type)
+        kind, default = types.type_info(field.type), default_of(field)
         text = texts.get(field.name, "")
         unit = _UNIT.search(text)
-        default = default_of(field)
         is_required = default is msgspec.NODEFAULT
         found.append(
             Key(
@@ -73,12 +71,11 @@ def keys(section: type[Section]) -> Iterator[Key]:
                 allowed_values(kind),
                 None if is_required else default,
                 is_required,
-                _section(hints[field.name]),
-                get_origin(hints[field.name]) is tuple,
+                _section(kind),
+                isinstance(kind, types.VarTupleType),
             )
         )
-    yield from (key for key in found if key.section is None)
-    yield from (key for key in found if key.section is not None)
+    yield from sorted(found, key=lambda key: key.section is not None)
 
 
 def all_sections(
@@ -96,19 +93,14 @@ def all_sections(
 def _docstrings(module: str) -> dict[str, dict[str, str]]:
     """Class -> field -> text after the field, in a module."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
-    return {
-        node.name: {
-            field.target.id: textwrap.dedent(text.value.value)
-            for field, text in zip(node.body, node.body[1:], strict=False)
-            if isinstance(field, ast.AnnAssign)
-            and isinstance(field.target, ast.Name)
-            and isinstance(text, ast.Expr)
-            and isinstance(text.value, ast.Constant)
-            and isinstance(text.value.value, str)
-        }
-        for node in tree.body
-        if isinstance(node, ast.ClassDef)
-    }
+    texts: dict[str, dict[str, str]] = {}
+    for section in (node for node in tree.body if isinstance(node, ast.ClassDef)):
+        of_section = texts[section.name] = {}
+        for field, below in pairwise(section.body):
+            match field, below:
+                case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(text))):
+                    of_section[name] = textwrap.dedent(text)
+    return texts
 
 
 def _plain(text: str) -> str:
@@ -117,8 +109,12 @@ def _plain(text: str) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
-def _section(kind: Any) -> type[Section] | None:
-    members = get_args(kind) if get_origin(kind) in (Union, UnionType, tuple) else (kind,)
-    return next(
-        (one for one in members if isinstance(one, type) and issubclass(one, Section)), None
-    )
+def _section(kind: types.Type) -> Any:
+    match kind:
+        case types.StructType(cls=section):
+            return section
+        case types.VarTupleType(item_type=item):
+            return _section(item)
+        case types.UnionType(types=members):
+            return next(filter(None, map(_section, members)), None)
+    return None

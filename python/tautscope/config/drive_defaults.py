@@ -80,11 +80,10 @@ def _of_servo(key: str, motor: dict[str, Any], protocol: str) -> dict[str, Any]:
         raise ConfigError(f"{key}.model", model, "one of " + ", ".join(models_of(protocol)))
     is_angle = motor.get("unit", "rad") == "rad" and key != Dof.INSERTION.key
     radian = {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)} if is_angle else {}
-    counts = (radian | motor).get("counts_per_unit")
-    if not isinstance(counts, int | float) or not counts > 0:
-        return radian  # refused when it is checked
+    counts: Any = (radian | motor).get("counts_per_unit")
     torque = motor.get("torque_limit", 1.0)
-    if not isinstance(torque, int | float) or not 0 < torque <= 1:
+    are_numbers = isinstance(counts, int | float) and isinstance(torque, int | float)
+    if not (are_numbers and counts > 0 and 0 < torque <= 1):
         return radian  # refused when it is checked
     turns = _SPEED_SHARE * torque * MODELS[model].speed / 60
     speed = turns * COUNTS_PER_TURN / counts

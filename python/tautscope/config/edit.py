@@ -54,12 +54,7 @@ def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
 
 
 def writable_file(path: str | PathLike[str]) -> Path:
-    """The file of a configuration that may be changed.
-
-    Raises:
-        MissingPathError: The file does not exist.
-        ConfigError: It is a shipped configuration.
-    """
+    """The file of a configuration that may be changed; it exists, and is not a shipped one."""
     file = Path(path)
     if file.is_file():
         return file
@@ -119,9 +114,9 @@ def _set(place: Any, key: str, value: Any, is_inline: bool) -> None:
     item = place.item(key) if hasattr(place, "item") else place[key]
     if isinstance(item, Item) and MARK in item.trivia.comment:
         comment = _PLACEHOLDER.sub("", item.trivia.comment)
-        is_empty = not comment.strip("# ")
-        item.trivia.comment = "" if is_empty else comment
-        item.trivia.comment_ws = "" if is_empty else item.trivia.comment_ws
+        if not comment.strip("# "):
+            comment = item.trivia.comment_ws = ""
+        item.trivia.comment = comment
 
 
 def inline(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from msgspec import Meta, field
+from msgspec import Meta
 
 from tautscope.config.fields import NonNegative, Positive
 from tautscope.config.section import Section, require
@@ -52,9 +52,9 @@ class ExperimentConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
 
     periods: Annotated[int, Meta(ge=3)] = 5
     """Number of periods per DOF [paper]."""
-    insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
-    rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
-    bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=0.9))
+    insertion: Sine = Sine(centre=25e-3, amplitude=15e-3)
+    rotation: Sine = Sine(centre=0.0, amplitude=2.0)
+    bending: Sine = Sine(centre=0.9, amplitude=0.9)
 
     def __getitem__(self, dof: Dof) -> Sine:
         """The reference of one DOF."""

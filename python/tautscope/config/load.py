@@ -93,14 +93,13 @@ def axes(
         raise ConfigError("count", count, f"1 to {MOST_DOFS}")
     default = [f"axis_{index + 1}" for index in range(count)]
     given = {"name": list(names or default), "width_limit": width_limit, "unit": unit, **keys}
-    entries: list[dict[str, Any]] = [{} for _ in range(count)]
+    columns: dict[str, Sequence[Any]] = {}
     for key, value in without_numpy(given).items():
-        each = value if isinstance(value, Sequence) and not isinstance(value, str) else None
-        if key == "range" and each and not isinstance(each[0], Sequence):
-            each = None  # one range for all
-        each = [value] * count if each is None else each
-        if len(each) != count:
+        is_list = isinstance(value, Sequence) and not isinstance(value, str)
+        if key == "range" and is_list and value and not isinstance(value[0], Sequence):
+            is_list = False  # one range for all
+        columns[key] = value if is_list else [value] * count
+        if len(columns[key]) != count:
             raise ConfigError(key, value, f"one value, or {count}")
-        for entry, one in zip(entries, each, strict=True):
-            entry[key] = one
-    return from_document({"dof": entries})
+    rows = zip(*columns.values(), strict=True)
+    return from_document({"dof": [dict(zip(columns, row, strict=True)) for row in rows]})

@@ -1,10 +1,7 @@
 """Types and ranges of configuration values in words."""
 
-from collections.abc import Sequence
-from functools import reduce
 from typing import Any
 
-import msgspec
 import msgspec.inspect as types
 
 
@@ -13,10 +10,10 @@ def allowed_values(kind: types.Type) -> str:
     match kind:
         case types.LiteralType(values=values):
             text = " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in values)
-        case types.FloatType() | types.IntType():
-            text = (
-                "a number" if isinstance(kind, types.FloatType) else "a whole number"
-            ) + _bounds(kind)
+        case types.FloatType():
+            text = f"a number{_bounds(kind)}"
+        case types.IntType():
+            text = f"a whole number{_bounds(kind)}"
         case types.StrType(pattern=str(pattern), min_length=least, max_length=most):
             text = f"a text of {least} to {most} characters like {pattern}"
         case types.StrType():
@@ -28,9 +25,8 @@ def allowed_values(kind: types.Type) -> str:
         case types.TupleType(item_types=items):
             text = "a list of " + " and ".join(map(allowed_values, items))
         case types.VarTupleType(item_type=item, max_length=most):
-            text = (
-                f"a list{f' of at most {most}' if most else ''}, each item {allowed_values(item)}"
-            )
+            size = f" of at most {most}" if most else ""
+            text = f"a list{size}, each item {allowed_values(item)}"
         case types.DictType(value_type=value):
             text = f"a table, each value {allowed_values(value)}"
         case types.UnionType(types=members):
@@ -41,45 +37,14 @@ def allowed_values(kind: types.Type) -> str:
     return text
 
 
-def allowed_at(kind: Any, keys: Sequence[str]) -> str:
-    """The allowed values at a path of keys and indices within an annotation."""
-    return allowed_values(reduce(_member, keys, types.type_info(kind)))
-
-
-def wrong_entry(kind: Any, keys: Sequence[str], entries: Any) -> str | None:
-    """The first key of a table of sections whose section is wrong; the table is at a path."""
-    place = reduce(_member, keys, types.type_info(kind))
-    if not isinstance(place, types.DictType) or not isinstance(place.value_type, types.StructType):
-        return None
-    for name, entry in entries.items():
-        try:
-            msgspec.convert(entry, place.value_type.cls)
-        except msgspec.ValidationError:
-            return str(name)
-    return None
-
-
-def _member(kind: types.Type, key: str) -> Any:
-    """The type at a key of a section, list or table; the type itself if it has no members."""
-    match kind:
-        case types.StructType(fields=fields):
-            return next((field.type for field in fields if field.name == key), kind)
-        case types.TupleType(item_types=items) if key.isdecimal():
-            return items[min(int(key), len(items) - 1)]
-        case types.VarTupleType(item_type=item):
-            return item
-        case types.DictType(value_type=value):
-            return value
-        case types.UnionType(types=members):
-            return next((found for one in members if (found := _member(one, key)) is not one), kind)
-    return kind
+def allowed_by(annotation: Any) -> str:
+    """The allowed values of an annotation in words."""
+    return allowed_values(types.type_info(annotation))
 
 
 def _bounds(kind: Any) -> str:
-    low = f"above {kind.gt:,.12g}" if kind.gt is not None else ""
-    low = f"of at least {kind.ge:,.12g}" if kind.ge is not None else low
-    high = f"below {kind.lt:,.12g}" if kind.lt is not None else ""
-    high = f"of at most {kind.le:,.12g}" if kind.le is not None else high
     if kind.ge is not None and kind.le is not None:
         return f" from {kind.ge:,.12g} to {kind.le:,.12g}"
-    return "".join(f" {part}" for part in (low, "and" if low and high else "", high) if part)
+    limits = {"above": kind.gt, "of at least": kind.ge, "below": kind.lt, "of at most": kind.le}
+    words = (f" {word} {limit:,.12g}" for word, limit in limits.items() if limit is not None)
+    return " and".join(words)

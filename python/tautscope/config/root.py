@@ -49,23 +49,14 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     docs/best.md."""
     law: LawConfig = field(default_factory=LawConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
-    insertion: DofConfig = field(
-        default_factory=lambda: DofConfig(
-            update_distance=0.4e-3,
-            observable_deviation=2e-3,
-            expected_width=8e-3,
-            start_deviation=5e-3,
-        )
+    insertion: DofConfig = DofConfig(
+        update_distance=0.4e-3, observable_deviation=2e-3, expected_width=8e-3, start_deviation=5e-3
     )
-    rotation: DofConfig = field(
-        default_factory=lambda: DofConfig(
-            update_distance=0.04, observable_deviation=0.1, expected_width=1.75, start_deviation=0.6
-        )
+    rotation: DofConfig = DofConfig(
+        update_distance=0.04, observable_deviation=0.1, expected_width=1.75, start_deviation=0.6
     )
-    bending: DofConfig = field(
-        default_factory=lambda: DofConfig(
-            update_distance=0.02, observable_deviation=0.1, expected_width=1.0, start_deviation=0.5
-        )
+    bending: DofConfig = DofConfig(
+        update_distance=0.02, observable_deviation=0.1, expected_width=1.0, start_deviation=0.5
     )
     instrument: InstrumentConfig = field(default_factory=InstrumentConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
@@ -174,11 +165,8 @@ def to_document(config: Config) -> dict[str, Any]:
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in changes.items():
-        old = merged.get(key)
-        if isinstance(old, dict) and isinstance(value, dict):
-            merged[key] = _merged(old, value)
-        else:
-            merged[key] = value
+        is_table = isinstance(value, dict) and isinstance(base.get(key), dict)
+        merged[key] = _merged(base[key], value) if is_table else value
     return merged
 
 

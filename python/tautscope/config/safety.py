@@ -105,9 +105,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def _check(self) -> None:
         require_names("off", self.off, DETECTORS)
         for index, limits in enumerate(self.command_travel):
-            require(limits[0] < limits[1], f"command_travel[{index}]", limits, LIMITS)
-            most = MOST_RATIO * max(map(abs, USUAL_TRAVEL[index]))
+            path, most = f"command_travel[{index}]", MOST_RATIO * max(map(abs, USUAL_TRAVEL[index]))
+            require(limits[0] < limits[1], path, limits, LIMITS)
             is_usual = max(map(abs, limits)) <= most or "safety.command_travel" in self.unusual
-            require(
-                is_usual, f"command_travel[{index}]", limits, f"within -{most:.3g} to {most:.3g}"
-            )
+            require(is_usual, path, limits, f"within -{most:.3g} to {most:.3g}")

@@ -2,9 +2,10 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
-from typing import Any, get_type_hints
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 from msgspec import Struct
@@ -89,7 +90,7 @@ def converted_value(path: str, value: Any, kind: Any) -> Any:
     try:
         converted = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
-        raise _config_error(error, value, path, kind) from None
+        raise _error_at(path, value, kind, error) from None
     _check_finite(converted, path)
     return converted
 
@@ -108,53 +109,41 @@ def _types(section: type[Section]) -> dict[str, Any]:
     return get_type_hints(section, include_extras=True)
 
 
-def _config_error(
-    error: msgspec.ValidationError, document: Any, prefix: str, kind: Any
-) -> ConfigError:
-    """Translate an error of msgspec, which names the key but not its value."""
-    message = str(error)
-    expected, _, path = (
-        message.rpartition(" - at `$") if " - at `$" in message else (message, "", "")
-    )
-    path = _with_entry(path.rstrip("`").lstrip("."), document, kind)
+def _error_at(path: str, value: Any, kind: Any, error: Exception) -> ConfigError:
+    """The error of the innermost value that is wrong, within one that is not of its type."""
+    for key, part, of in _parts(value, kind):
+        try:
+            msgspec.convert(part, of)
+        except msgspec.ValidationError as inner:
+            return _error_at(_joined(path, key), part, of, inner)
     cause = error.__cause__
     if isinstance(cause, ConfigError):  # of a section's own constructor
-        return ConfigError(_joined(prefix, path, cause.field), cause.value, cause.allowed)
-    unknown = re.search(r"unknown field `([^`]*)`", expected)
-    missing = re.search(r"missing required field `([^`]*)`", expected)
-    if match := unknown or missing:
-        path = _joined(path, match[1])
-    value: Any = document
-    keys = re.findall(r"[^.\[\]]+", path)
-    for key in keys:
-        try:
-            value = value[int(key)] if isinstance(value, list | tuple) else value[key]
-        except (KeyError, TypeError, IndexError, ValueError):
-            value = None
-            break
-    if unknown:
-        allowed = "no such key; `tautscope config` prints all keys"
-    elif missing:
-        allowed = "a value: it has no default"
-    else:
-        from tautscope.config.ranges import allowed_at  # noqa: PLC0415  only errors need it
+        return ConfigError(_joined(path, cause.field), cause.value, cause.allowed)
+    match = re.search("(unknown|missing required) field `([^`]*)`", str(error))
+    if match and isinstance(value, dict):
+        unknown = "no such key; `tautscope config` prints all keys"
+        allowed = unknown if match[1] == "unknown" else "a value: it has no default"
+        return ConfigError(_joined(path, match[2]), value.get(match[2]), allowed)
+    from tautscope.config.ranges import allowed_by  # noqa: PLC0415  only errors need it
 
-        allowed = allowed_at(kind, keys)
-    return ConfigError(_joined(prefix, path) or "config", value, allowed)
+    return ConfigError(path or "config", value, allowed_by(kind))
 
 
-def _with_entry(path: str, document: Any, kind: Any) -> str:
-    """A path with the name of a table's entry, for which msgspec has "[...]"."""
-    place, found, rest = path.partition("[...]")
-    if not found:
-        return path
-    from tautscope.config.ranges import wrong_entry  # noqa: PLC0415  only errors need it
-
-    keys = re.findall(r"[^.\[\]]+", place)
-    for key in keys:
-        document = document[int(key) if isinstance(document, list | tuple) else key]
-    name = wrong_entry(kind, keys, document)
-    return path if name is None else f"{place}.{name}{rest}"
+def _parts(value: Any, kind: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Key, value and type of each part of a section, table or list."""
+    origin, of = get_origin(kind), get_args(kind)
+    if origin in (Annotated, Union, UnionType):
+        for member in of[:1] if origin is Annotated else of:
+            yield from _parts(value, member)
+    elif origin is tuple and isinstance(value, list | tuple):
+        kinds = of[:1] * len(value) if Ellipsis in of else of
+        if len(kinds) == len(value):  # else it is the list that is wrong
+            places = (f"[{index}]" for index in range(len(value)))
+            yield from zip(places, value, kinds, strict=True)
+    elif origin is dict and isinstance(value, dict):
+        yield from ((str(name), part, of[1]) for name, part in value.items())
+    elif isinstance(value, dict) and isinstance(kind, type) and issubclass(kind, Section):
+        yield from ((key, value[key], of) for key, of in _types(kind).items() if key in value)
 
 
 def _joined(*parts: str) -> str:

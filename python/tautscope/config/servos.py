@@ -10,9 +10,7 @@ COUNTS_PER_TURN = 4096
 class ServoModel:
     """A model of a servo.
 
-    Attributes:
-        protocol: ``drives.protocol`` for it.
-        speed: Speed without load at the recommended voltage [1/min], from its manual.
+    Its speed [1/min] is that without load at the recommended voltage, from its manual.
     """
 
     protocol: str

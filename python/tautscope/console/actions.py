@@ -46,9 +46,8 @@ class Actions:
             return None
         what = message.name if isinstance(message, msg.Action | msg.Setting) else "profile"
         self._text = ""
-        reason = control.lease.refusal(
-            client, message, time.monotonic(), needs_image=what in PROGRAMS
-        )
+        moves, now = what in PROGRAMS, time.monotonic()
+        reason = control.lease.refusal(client, message, now, needs_image=moves)
         if not reason and what == "enable" and inbound.at <= control.ended_at:
             # It waited, at a link that stood or while the rig opened, and must not undo the stop.
             reason = "motion was stopped after it, press Enable again"

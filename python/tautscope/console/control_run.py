@@ -21,6 +21,8 @@ from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Rig, Sample
 from tautscope.runs.control_loop import ControlLoop
 
+Update = tuple[Frame | Measurement, Report, float]
+"""What caused an update of the loop, its result, and when it arrived [s, monotonic clock]."""
 LATE = 2.0
 """A tick that begins so many control periods after the last one is late."""
 _TIMES = 200_000
@@ -35,38 +37,28 @@ class ReferenceSource(Protocol):
     @property
     def reference(self) -> Floats:
         """Reference u (n,) [m or rad] of the last tick."""
-        ...
 
     @property
     def age(self) -> float | None:
         """Time from when the reference was made to the last tick [s]; None: made in the tick."""
-        ...
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The reference of a tick, as `tautscope.console.operator_input.OperatorInput.update`."""
-        ...
 
 
 class ControlRun(ControlLoop):
     """Ticks of the control loop with the operator's reference, all of them in a log.
 
-    Args:
-        rig: A rig after its `reset`, whose `step` waits for the end of the control period.
-        sample: Its newest sample.
-        path: New file of the log.
-        executor: Runs the marker detection.
+    The rig has been reset; its `step` waits for the end of the control period.
 
     Attributes:
-        log, path: Its log, and the file of this.
         reference: u (n,) [m or rad] of the last tick.
-        report: The newest update.
         ticks, late: Number of ticks, and of those that were late.
         unused: Number of images that the loop did not use.
         compensation: Share of the compensation that the operator has chosen.
         times: Computing time of each tick [s].
         uncompensated: Where the tip would be now without compensation (n,) [m or rad].
         uncompensated_by: By what that is known.
-        score: Tracking errors with and without compensation.
     """
 
     def __init__(
@@ -79,8 +71,7 @@ class ControlRun(ControlLoop):
         path: Path,
         executor: Executor,
     ) -> None:
-        is_article = isinstance(rig, HardwareRig)
-        monitor = partial(PlausibilityMonitor, config) if is_article else None
+        monitor = partial(PlausibilityMonitor, config) if isinstance(rig, HardwareRig) else None
         super().__init__(config, rig, sample, executor=executor, monitor=monitor)
         self.path = path
         with realtime(OTHERS):  # of the log's threads, which inherit it
@@ -120,12 +111,8 @@ class ControlRun(ControlLoop):
         kept = self._uncompensated
         return next((state for at, state in reversed(kept) if at <= time), self.uncompensated)
 
-    def tick(self) -> list[tuple[Frame | Measurement, Report, float]]:
-        """Compute the command; the updates that have ended, with the arrivals of what caused them.
-
-        Raises:
-            ConfigError: The rig differs from its configuration.
-        """
+    def tick(self) -> list[Update]:
+        """Compute the command; the updates that have ended."""
         began, sample, period = time.monotonic(), self.sample, self._rig.control_period
         self.late += self.ticks > 0 and began - self._began > LATE * period
         self._began = began
@@ -140,7 +127,7 @@ class ControlRun(ControlLoop):
         self.times.append(time.monotonic() - began)
         if sample.frame is not None:
             self._arrivals.append((sample.frame.sequence, began))
-        updates: list[tuple[Frame | Measurement, Report, float]] = []
+        updates: list[Update] = []
         for source, report in self.updates():
             self.report = report
             arrived_at = began

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from websockets.asyncio.server import ServerConnection
@@ -19,7 +18,6 @@ from tautscope.calibration.images import to_bgr
 from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.shared import Channels, ImageChannel
-from tautscope.console.state import Layout
 
 POLL_PERIOD = 0.004
 """Time between two looks into the shared memory [s]."""
@@ -29,19 +27,14 @@ JPEG_QUALITY = 80
 
 
 class StateFeed:
-    """The state of the control process, and its replies to each page.
+    """The state of the control process, and its replies to each page, after the layout.
 
-    Args:
-        layout: Sent to each page once.
-        latency: Returns median and 95th percentile of the time from an image's arrival until it
-            was drawn [s], if they are known.
-
-    Attributes:
-        holder: The connection that holds the lease, as of the newest state.
+    `holder` is the connection that holds the lease, as of the newest state; `latency` returns that
+    of `ImageFeed`.
     """
 
     def __init__(
-        self, channels: Channels, layout: Layout, latency: Callable[[], tuple[float, float] | None]
+        self, channels: Channels, layout: object, latency: Callable[[], tuple[float, float] | None]
     ) -> None:
         self._channels, self._layout, self._latency = channels, layout, latency
         self._newest = b""
@@ -54,18 +47,16 @@ class StateFeed:
         """Poll the shared memory."""
         while True:
             await asyncio.sleep(POLL_PERIOD)
-            found = self._channels.state.newest()
-            replies = []
-            while (reply := self._channels.replies.following()) is not None:
-                replies.append(reply[1])
-            if found is None and not replies:
+            found, reply = self._channels.state.newest(), self._channels.replies.following()
+            if found is None and reply is None:
                 continue
             if found is not None:
                 self._number, self._newest = found
                 self.holder = msg.decode_state(self._newest)["holder"]
-            for data in replies:
-                if (queue := self._replies.get(msg.decode_reply(data).client)) is not None:
-                    queue.append(data)
+            while reply is not None:
+                if (queue := self._replies.get(msg.decode_reply(reply[1]).client)) is not None:
+                    queue.append(reply[1])
+                reply = self._channels.replies.following()
             async with self._has_news:
                 self._has_news.notify_all()
 
@@ -82,9 +73,8 @@ class StateFeed:
                         lambda: self._number != number or bool(replies)  # noqa: B023
                     )
                 while replies:
-                    await connection.send(
-                        f'{{"type":"reply","reply":{replies.popleft().decode()}}}'
-                    )
+                    reply = replies.popleft().decode()
+                    await connection.send(f'{{"type":"reply","reply":{reply}}}')
                 if self._number != number:
                     number = self._number
                     latency = msg.encode(self._latency()).decode()
@@ -139,7 +129,7 @@ class ImageFeed:
             image, overlay = found
             width = max(viewer.width for viewer in self._viewers.values())
             jpeg = await asyncio.to_thread(encode_jpeg, image, self._pixel_format, width)
-            info = msgspec.json.encode(overlay)
+            info = msg.encode(overlay)
             self._newest = b"".join((len(info).to_bytes(4, "little"), info, jpeg))
             self._sequence, self._arrived_at = overlay.sequence, overlay.published_at
             for viewer in self._viewers.values():
@@ -160,6 +150,8 @@ class ImageFeed:
                 await connection.send(self._newest)
         except ConnectionClosed:
             pass
+        finally:
+            del self._viewers[connection]
 
     @property
     def latency(self) -> tuple[float, float] | None:
@@ -176,10 +168,6 @@ class ImageFeed:
             self.latencies.append(time.monotonic() - arrived_at)
         viewer.sent = {each: at for each, at in viewer.sent.items() if each > sequence}
         viewer.may_send.set()
-
-    def remove(self, connection: ServerConnection) -> None:
-        """Forget a page."""
-        self._viewers.pop(connection, None)
 
 
 def encode_jpeg(image: NDArray[np.uint8], pixel_format: PixelFormat, width: float) -> bytes:

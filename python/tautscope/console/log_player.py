@@ -58,16 +58,14 @@ class LogPlayer:
         self._kinematics = build_kinematics(config) if config.dof else None
         self._state = blank_state("replay", config)
         self._state.motion, self._state.drives = "replay", "recorded"
-        self._state.message = f"Recording {log.path.name}. Nothing is steered."
         self._state.must_release = False
         self._state.log = LogState(str(log.path), log.path.stat().st_size)
         self._state.uncompensated_by = MODEL
         self._published_at = 0.0
         self._images = 0
         self._events = list(log.events.items())
-        ticks = ((k, each[1]) for k, each in enumerate(self._events))
-        found = [(each.sample.time, k) for k, each in ticks if isinstance(each, Tick)]
-        self._times, self._indices = [at for at, _ in found], [k for _, k in found]
+        ticks = [(k, each) for k, (_, each) in enumerate(self._events) if isinstance(each, Tick)]
+        self._times, self._indices = [each.sample.time for _, each in ticks], [k for k, _ in ticks]
         self._is_playing = True
         self._next = 0
         self._offset: float | None = None
@@ -108,11 +106,13 @@ class LogPlayer:
     def _answer(self) -> None:
         while (found := self._channels.inbound.following()) is not None:
             inbound = msg.decode_inbound(found[1])
-            if isinstance(inbound, msg.Received) and isinstance(inbound.message, msg.Seek):
-                if inbound.message.time is not None:
-                    self._seek(inbound.message.time)
-                self._is_playing, self._offset = inbound.message.is_playing, None
-            elif isinstance(inbound, msg.Received):
+            if isinstance(inbound, msg.Gone):
+                continue
+            if isinstance(seek := inbound.message, msg.Seek):
+                if seek.time is not None:
+                    self._seek(seek.time)
+                self._is_playing, self._offset = seek.is_playing, None
+            else:
                 reply = msg.Reply(inbound.client, "request", False, "this is a recording")
                 self._channels.replies.write(msg.encode(reply))
 
@@ -122,6 +122,7 @@ class LogPlayer:
         self._model: PlayTip | None = None
         self._score = Score(len(self._log.config.dofs), self._log.config.control.period)
         self._state.compensation = 1.0  # unless a request before that time changed it
+        self._state.message = f"Recording {self._log.path.name}. Nothing is steered."
         if not self._times:
             return
 
@@ -130,7 +131,6 @@ class LogPlayer:
             return self._indices[min(at, len(self._times) - 1)]
 
         self._next, begin = tick_at(time), self._events[tick_at(time - _LEAD_IN)][0]
-        self._state.message = f"Recording {self._log.path.name}. Nothing is steered."
         for index, event in self._events[: self._next + 1]:
             if index >= begin or isinstance(event, Request):
                 self._add(index, event)
@@ -176,13 +176,11 @@ class LogPlayer:
         state.tip = known(tip)
         state.delta_minus, state.delta_plus = values(update.delta_minus), values(update.delta_plus)
         self._images += 1
-        age = float(row["arrived_at"] - row["captured_at"])
-        state.image = ImageState(self._images, str(row["status"]), age, updates=self._images)
-        state.image.deviation = (None,) * len(dofs)
+        age, status = float(row["arrived_at"] - row["captured_at"]), str(row["status"])
+        nothing, number = (None,) * len(dofs), self._images
+        state.image = ImageState(number, status, age, updates=number, deviation=nothing)
         if self._log.has_image(index):
             a, b = (math.isfinite(row[f"features_{band}_x"]) for band in "ab")
-            reference = np.array(state.reference)
-            without = np.array(state.uncompensated, np.float64)
-            bands = Bands(estimate, predicted, reference, without, (a, b))
-            image = self._log.image(index)
-            self._publisher.submit(self._images, image, time.monotonic(), bands)
+            shown = np.array(state.reference), np.array(state.uncompensated, np.float64)
+            bands = Bands(estimate, predicted, *shown, (a, b))
+            self._publisher.submit(number, self._log.image(index), time.monotonic(), bands)

@@ -31,13 +31,8 @@ class Pace:
 class PacedRig:
     """A rig that is made anew at each `reset`, in real time also where its `step` does not wait.
 
-    Args:
-        make: Makes the rig.
-        control_period: Its control period [s].
-        is_simulated: Whether no motors move.
-
-    Raises:
-        DriveError: In place of any error of the rig that is none of this package.
+    A simulated one moves no motors. Errors of the rig that are none of this package become a
+    `DriveError`.
     """
 
     def __init__(
@@ -45,7 +40,6 @@ class PacedRig:
     ) -> None:
         self._make, self.control_period, self.is_simulated = make, control_period, is_simulated
         self._rig: Rig | None = None
-        self._pace = Pace(control_period)
 
     def reset(self) -> Sample:
         """Make a rig, and go to its start."""
@@ -65,9 +59,7 @@ class PacedRig:
 
     def interrupt(self) -> None:
         """Quick-stop a rig that can be interrupted, as a `MotorRig`; for any thread."""
-        interrupt: Callable[[], None] | None = getattr(self._rig, "interrupt", None)
-        if interrupt is not None:
-            self._checked(interrupt)
+        self._checked(getattr(self._rig, "interrupt", lambda: None))
 
     def close(self) -> None:
         """Stop the motors; the next `reset` makes another rig."""

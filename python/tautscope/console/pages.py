@@ -14,11 +14,7 @@ _TYPES = {
 
 
 class Pages:
-    """All files of the page in memory; nothing else can be requested.
-
-    Attributes:
-        files: Path -> content type and content.
-    """
+    """All files of the page in memory: path -> content type and content. There are no others."""
 
     def __init__(self, hosts: list[str]) -> None:
         self.files = {

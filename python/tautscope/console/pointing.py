@@ -36,10 +36,7 @@ class Pointing:
     Insertion takes no part: the image barely shows motion along the optical axis, and the other two
     degrees of freedom reach a pixel without it.
 
-    Wrong when the geometry of camera or instrument is.
-
-    Args:
-        config: Camera and instrument, without [[dof]].
+    Wrong when the geometry of camera or instrument is. Instruments with [[dof]] have none.
     """
 
     def __init__(self, config: Config) -> None:

@@ -5,6 +5,7 @@ import shutil
 import threading
 import time
 from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -64,13 +65,9 @@ class Publisher:
     def submit(
         self, sequence: int, image: Image, arrived_at: float, bands: Bands | None = None
     ) -> None:
-        """Show an image, in place of one that still waits.
+        """Show an image that arrived at a time [s, monotonic clock], and bands drawn over it.
 
-        Args:
-            sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
-            image: The image.
-            arrived_at: When the control loop got it [s, monotonic clock].
-            bands: What is drawn over it; None where nothing is.
+        It replaces one that still waits; the sequence is that of `ImageTimes`.
         """
         self._next = image, Overlay(sequence, arrived_at, *self._size), bands
         self.image = image
@@ -109,8 +106,7 @@ class Publisher:
             self.failure = ""
 
     def _add_bands(self, overlay: Overlay, bands: Bands) -> None:
-        measured = zip(self._outlines(bands.estimate), bands.found, strict=False)
-        overlay.measured = [outline for outline, is_found in measured if is_found]
+        overlay.measured = list(compress(self._outlines(bands.estimate), bands.found))
         overlay.predicted = self._outlines(bands.predicted)
         overlay.tip = self._tip(bands.estimate)
         overlay.target = self._tip(bands.reference)

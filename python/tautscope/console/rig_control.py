@@ -27,10 +27,8 @@ INTERRUPTED = "STOP, or the page was away, while they were being enabled"
 class RigControl:
     """Starts and ends runs of the control loop.
 
-    Args:
-        rig: In real time: a `LiveTwin`, `HardwareRig`, or a rig of the user's as a `PacedRig`.
-        folder: For logs and stills.
-        executor: Runs the marker detection.
+    The rig is one in real time: a `LiveTwin`, `HardwareRig`, or a rig of the user's as a
+    `PacedRig`. Logs and stills are in the folder; the executor runs the marker detection.
 
     Attributes:
         images: When images were published, or without images states.
@@ -38,12 +36,10 @@ class RigControl:
         run: The present run; None while the rig is off.
         fault: Why the rig is off; empty if it is not, or was never on.
         unconfirmed: Why the motors may still move although they were stopped; empty if they do not.
-        is_opening: Whether the drives are being enabled.
-        is_interrupted: Whether this has to end, or had to: by STOP, or without a page.
+        is_interrupted: Whether opening has to end, or had to: by STOP, or without a page.
         stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
         ended_at: When motion was last stopped, or the rig went off [s, monotonic clock].
         compensation: Share of the compensation that the operator has chosen.
-        is_recording: Whether a take is being recorded, with lossless images.
         while_opening: Called periodically, in another thread, while the rig opens: this takes
             seconds, in which commands have to be received.
     """

@@ -9,13 +9,11 @@ import hmac
 import signal
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from http import HTTPStatus
 from multiprocessing import parent_process
 from typing import Any, TypeVar
 
 import msgspec
-from websockets.asyncio.server import Server as WebSocketServer
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
@@ -74,14 +72,6 @@ class Server:
 
     async def run(self, listener: Any) -> None:
         """Serve connections of a bound socket until the control process ends."""
-        async with self.serving(sock=listener):
-            parent = parent_process()
-            while parent is not None and parent.is_alive():
-                await asyncio.sleep(0.05)
-
-    @asynccontextmanager
-    async def serving(self, **address: Any) -> AsyncIterator[WebSocketServer]:
-        """Serve during the block."""
         options: dict[str, Any] = {
             "process_request": self._process_request,
             "origins": self._origins,
@@ -95,16 +85,16 @@ class Server:
             "ping_timeout": 5.0,
             "server_header": None,
         }
+        parent = parent_process()
         async with (
-            serve(self._handle, **address, **options) as server,
+            serve(self._handle, sock=listener, **options),
             asyncio.TaskGroup() as group,  # an error of a feed ends the server
         ):
             feeding = [group.create_task(feed.run()) for feed in (self._states, self._images)]
-            try:
-                yield server
-            finally:
-                for task in feeding:
-                    task.cancel()
+            while parent is not None and parent.is_alive():
+                await asyncio.sleep(0.05)
+            for task in feeding:
+                task.cancel()
 
     def _process_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer requests for pages; None lets the connection become a socket."""
@@ -184,5 +174,4 @@ class Server:
             async for drawn in self._messages(connection, msg.decode_video):
                 self._images.acknowledge(connection, drawn.image, drawn.width)
         finally:
-            self._images.remove(connection)
             sending.cancel()

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from tautscope.console import messages as msg
 from tautscope.console.actions import Actions
-from tautscope.console.control_run import ControlRun
+from tautscope.console.control_run import ControlRun, Update
 from tautscope.console.publisher import Bands, Publisher
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
@@ -17,8 +17,6 @@ from tautscope.console.shared import Channels
 from tautscope.console.state import STATE_PERIOD
 from tautscope.errors import TautscopeError, described
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.measurement import Measurement
-from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
 
@@ -74,9 +72,7 @@ class Session:
             _LOG.warning("%s", error)
             control.close(described(error))
 
-    def _show(
-        self, run: ControlRun, updates: list[tuple[Frame | Measurement, Report, float]]
-    ) -> None:
+    def _show(self, run: ControlRun, updates: list[Update]) -> None:
         """Show what images of the bands told, or a picture that tells the loop nothing."""
         for frame, report, arrived_at in updates:
             if not isinstance(frame, Frame):
@@ -84,10 +80,8 @@ class Session:
             sequence = self._control.images.add(arrived_at)
             detection = report.detection
             found = (False, False) if detection is None else detection.found
-            without = run.uncompensated_at(report.captured_at)
-            bands = Bands(
-                report.state_estimate, report.predicted_state, run.reference, without, found
-            )
+            told = report.state_estimate, report.predicted_state, run.reference
+            bands = Bands(*told, run.uncompensated_at(report.captured_at), found)
             self._publisher.submit(sequence, frame.image, arrived_at, bands)
         if self._control.config.dof and (picture := run.sample.frame) is not None:
             self._layout.checked(picture.image)

@@ -16,13 +16,12 @@ import numpy as np
 
 from tautscope.calibration.images import Image
 from tautscope.config import Config
-from tautscope.console.messages import LARGEST_MESSAGE
+from tautscope.console.messages import LARGEST_MESSAGE, encode
 from tautscope.console.state import layout_of
 from tautscope.loop.frame_layout import FrameLayout
 
 _HEADER = struct.Struct("<QII")
 """Number of the record from 1 on, length and checksum of its data."""
-_NUMBER = struct.Struct("<Q")
 _SMALL = 2 * LARGEST_MESSAGE
 _IMAGES = 3
 _SIZES = {
@@ -61,11 +60,7 @@ class Slots:
         return self._stride - _HEADER.size
 
     def write(self, data: bytes) -> int:
-        """Write a record; its number.
-
-        Raises:
-            ValueError: It is longer than `capacity`.
-        """
+        """Write a record; its number."""
         if len(data) > self.capacity:
             raise ValueError(f"a record of {len(data)} bytes, longer than {self.capacity}")
         number = self._written + 1
@@ -80,7 +75,7 @@ class Slots:
     def newest(self) -> tuple[int, bytes] | None:
         """Number and data of the newest complete record, if it was not read before."""
         number = max(
-            _NUMBER.unpack_from(self._memory, slot * self._stride)[0] for slot in range(self._count)
+            _HEADER.unpack_from(self._memory, slot * self._stride)[0] for slot in range(self._count)
         )
         if number <= self._read or (data := self._record(number)) is None:
             return None
@@ -94,7 +89,7 @@ class Slots:
             self._read += 1
             return self._read, data
         at = (self._read + 1) % self._count * self._stride
-        if _NUMBER.unpack_from(self._memory, at)[0] > self._read + 1:
+        if _HEADER.unpack_from(self._memory, at)[0] > self._read + 1:
             return self.newest()
         return None
 
@@ -151,13 +146,9 @@ class Channels:
     """Views of a `SharedMemory`; each process makes its own."""
 
     def __init__(self, memory: SharedMemory) -> None:
-        slots = {
-            name: Slots(memoryview(memory.slots[name]), count)
-            for name, (_, count) in _SIZES.items()
-        }
-        self.servo, self.stop, self.inbound = slots["servo"], slots["stop"], slots["inbound"]
-        self.state, self.replies = slots["state"], slots["replies"]
-        self.images = ImageChannel(memory, slots["images"])
+        slots = (Slots(memoryview(memory.slots[name]), n) for name, (_, n) in _SIZES.items())
+        self.servo, self.stop, self.inbound, self.state, self.replies, images = slots
+        self.images = ImageChannel(memory, images)
 
 
 class ImageChannel:
@@ -168,12 +159,11 @@ class ImageChannel:
         self._info = info
         self._number = 0
         self._decode = msgspec.json.Decoder(Overlay).decode
-        self._encode = msgspec.json.Encoder().encode
 
     def write(self, image: Image, overlay: Overlay) -> None:
         """Write an image."""
         np.copyto(self._pixels[(self._number + 1) % _IMAGES], image)
-        self._number = self._info.write(self._encode(overlay))
+        self._number = self._info.write(encode(overlay))
 
     def newest(self) -> tuple[Image, Overlay] | None:
         """A copy of the newest image, if it was not read before.

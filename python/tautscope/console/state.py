@@ -2,7 +2,7 @@
 
 import math
 from itertools import zip_longest
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from msgspec import Struct, field
@@ -21,38 +21,19 @@ Known = tuple[float | None, ...]
 """(n,) [m or rad]; None where it is not known."""
 
 
-class DofLayout(Struct, frozen=True):
-    """A DOF on the page, with its unit, mm or rad, and its range of commands [m or rad], if any."""
-
-    name: str
-    unit: str
-    range: tuple[float, float] | None
-
-
-class Layout(Struct, frozen=True):
+def layout_of(config: Config) -> dict[str, Any]:
     """What a page has to know of an instrument, once.
 
-    Attributes:
-        dofs: In the order of every (n,).
-        sees_bands: Whether images of the bands are the measurement; they are shown, and commands
-            name the image displayed. Without them commands name the state displayed.
-        programs: Motions that run by themselves.
+    `dofs` are in the order of every (n,), with the range of commands [m or rad], if any. With
+    `sees_bands` images of the bands are the measurement; they are shown, and commands name the
+    image displayed. Without them commands name the state displayed.
     """
-
-    dofs: tuple[DofLayout, ...]
-    sees_bands: bool
-    programs: tuple[str, ...]
-
-
-def layout_of(config: Config) -> Layout:
-    """The layout of the page for a configuration."""
-    ranges = [dof.range for dof in config.dof]
-    dofs = zip_longest(config.dofs, ranges)
-    return Layout(
-        tuple(DofLayout(dof.label, dof.display_unit, ends) for dof, ends in dofs),
-        not config.dof,
-        programs_of(config),
-    )
+    dofs = zip_longest(config.dofs, [dof.range for dof in config.dof])
+    return {
+        "dofs": [{"name": d.label, "unit": d.display_unit, "range": ends} for d, ends in dofs],
+        "sees_bands": not config.dof,
+        "programs": programs_of(config),
+    }
 
 
 class ImageState(Struct):
@@ -93,18 +74,6 @@ class LogState(Struct):
     failure: str = ""
 
 
-class Positions(Struct):
-    """Where the tip is, for instruments without an image; each (3,) [m] in the frame of the guide.
-
-    None where it is not known; ``true`` in simulations.
-    """
-
-    reference: Values | None
-    tip: Values | None
-    true: Values | None
-    uncompensated: Values | None
-
-
 class State(Struct):
     """All that a page shows beside the image. Every (n,) is [m or rad].
 
@@ -118,7 +87,8 @@ class State(Struct):
         true: (n,) true tip, in simulations without an image of it.
         uncompensated, uncompensated_by: (n,) tip without compensation, and by what it is known.
         score: (n,) as `Score.errors`.
-        positions: For the side view, where a kinematics has positions.
+        positions: For the side view, where a kinematics has positions: of reference, tip, true and
+            uncompensated, each (3,) [m] in the frame of the guide, None where it is not known.
         width_std: (n,) standard deviations of the slack's width.
         reaction, flags: The supervisor's reaction in force, and the active flags.
         latched: The flags since the last acknowledgement, the most urgent first; each with its
@@ -130,10 +100,8 @@ class State(Struct):
         lease, holder: As of `Lease`.
         program, progress: Motion that runs by itself, empty if none, and its share done.
         program_ended: How the last one ended; empty before one has.
-        is_recording: Whether a take is being recorded.
         late: Number of control ticks that came late, and all of them.
         stopped_at: When the newest STOP took effect [s, monotonic clock].
-        drives: The drives' state, in words.
         replay: Time and duration of a recording [s], and whether it plays; None if live.
     """
 
@@ -153,7 +121,7 @@ class State(Struct):
     uncompensated: Known = ()
     uncompensated_by: str = ""
     score: list[tuple[float, float] | None] = field(default_factory=list)
-    positions: Positions | None = None
+    positions: dict[str, Values | None] | None = None
     width_std: Known = ()
     reaction: str = "none"
     flags: tuple[str, ...] = ()
@@ -183,13 +151,12 @@ class State(Struct):
         """Add what an image would show: the true tip (n,), and positions by the kinematics."""
         self.true = None if true is None else values(true)
         if kinematics is not None:
-            shown = self.reference, self.tip, self.true, self.uncompensated
-            self.positions = Positions(
-                *(
-                    values(kinematics.tip(np.array(of))[0]) if of and None not in of else None
-                    for of in shown
-                )
-            )
+            self.positions = {}
+            for name in ("reference", "tip", "true", "uncompensated"):
+                of = getattr(self, name)
+                is_known = of and None not in of
+                place = values(kinematics.tip(np.array(of))[0]) if is_known else None
+                self.positions[name] = place
 
 
 def blank_state(mode: Mode, config: Config) -> State:

@@ -20,16 +20,12 @@ class ComparedRig(Protocol):
 
     def step_uncompensated(self, reference: Floats) -> Floats:
         """True tip (n,) [m or rad] of the second instrument one control period later."""
-        ...
 
 
 class PlayTip:
     """The tip by plays, Eq. (1), with the reference u as input: what compensation would leave.
 
     q <- clamp(q, u - delta_plus, u - delta_minus), per DOF, with the offsets as estimated now.
-
-    Args:
-        tip: Where it starts (n,) [m or rad].
 
     Wrong when the slack is not that of a play, when DOFs share a friction, and as far as the
     estimate is.
@@ -48,11 +44,7 @@ class Score:
     """RMS tracking errors of the last minute of motion, with and without compensation.
 
     e = sqrt(mean((tip - reference)^2)) per DOF, over the ticks in which its reference moved and
-    the loop compensated, of the last `WINDOW` s of these.
-
-    Args:
-        count: Number of DOFs.
-        period: Time between two ticks [s].
+    the loop compensated, of the last `WINDOW` s of these; a tick takes `period` s.
     """
 
     def __init__(self, count: int, period: float) -> None:

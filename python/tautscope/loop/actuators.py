@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, check_config
 from tautscope.config.actuators import scaled_matrix
 from tautscope.errors import ConfigError, SignalError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.named_class import instance, named_class
 from tautscope.loop.rig import Rig, Sample
 from tautscope.loop.signal_checks import check_signal
 
-Floats = NDArray[np.float64]
 Map = Callable[[Floats], ArrayLike]
 _LOG = logging.getLogger(__name__)
 _ROUNDING, _SECANTS = 1e-9, 20
@@ -33,7 +33,7 @@ class Actuators:
         if config.actuators is None:
             raise ConfigError("actuators", None, "a section with matrix or map")
         self._config, self._count = config.actuators, len(config.dof)
-        self._limits = np.array(self._config.limits).reshape(-1, 2).T
+        self._limits = np.array(self._config.limits or [(-np.inf, np.inf)]).T
         self._forward: Map | None = None
         self._backward: Map | None = None
         if self._config.map:
@@ -56,8 +56,8 @@ class Actuators:
         if self._forward is None:
             return np.asarray(self._matrix @ values + self._offsets)
         found = self._forward(values)
-        limits = self._limits.size // 2
-        return check_signal("actuators.map", found, (limits or max(1, np.size(found)),))
+        count = len(self._config.limits) or max(1, np.size(found))
+        return check_signal("actuators.map", found, (count,))
 
     def dofs(self, motors: ArrayLike) -> Floats | None:
         """Degrees of freedom (n,) of positions (m,) of the motors; None if the map has no way back.
@@ -103,8 +103,6 @@ class Actuators:
         return reached
 
     def _is_outside(self, positions: Floats) -> NDArray[np.bool_]:
-        if not self._limits.size:
-            return np.zeros(len(positions), dtype=np.bool_)
         low, high = self._limits
         rounding = _ROUNDING * (high - low)
         outside: NDArray[np.bool_] = (positions < low - rounding) | (positions > high + rounding)

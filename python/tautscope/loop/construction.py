@@ -24,12 +24,12 @@ def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
     if config.dof:
         for entry, speed in zip(document["dof"], speeds, strict=False):
             entry["command_speed"] = speed
-    elif speeds:
-        document["safety"]["command_speed"] = speeds
-    if config.dof:
         # Not used with [[dof]]: only its defaults that are no lengths.
         document["insertion"] = msgspec.to_builtins(Config().insertion)
-    elif not compensate:
+        return document
+    if speeds:
+        document["safety"]["command_speed"] = speeds
+    if not compensate:
         for dof in Dof:
             document[dof.label]["free_gain"] = 1.0
         document["law"]["free_gain"] = 1.0
@@ -79,12 +79,8 @@ def build_camera(config: Config) -> _core.Camera:
 def build_feature_model(config: Config) -> _core.FeatureModel:
     """The predicted features and their interaction matrix, Eqs. (9)-(11)."""
     pose = config.camera.camera_from_guide
-    return _core.FeatureModel(
-        build_instrument(config),
-        build_camera(config),
-        translation=pose.translation,
-        rotation=pose.rotation,
-    )
+    parts = build_instrument(config), build_camera(config)
+    return _core.FeatureModel(*parts, translation=pose.translation, rotation=pose.rotation)
 
 
 def build_state_estimator(config: Config) -> _core.StateEstimator:

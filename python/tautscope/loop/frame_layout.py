@@ -18,27 +18,19 @@ from numpy.typing import NDArray
 from tautscope.config import CameraConfig
 from tautscope.errors import FrameError
 
-_CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
-_PLANAR = ("nv12", "i420")
+_CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}  # the others are planar
 _BYTE = np.dtype(np.uint8)
 
 
 class FrameLayout:
-    """Memory layout of the images of a camera.
-
-    Attributes:
-        shape: Shape of the arrays.
-    """
+    """Memory layout of the images of a camera."""
 
     def __init__(self, camera: CameraConfig) -> None:
         self.pixel_format = camera.pixel_format
-        planar = self.pixel_format in _PLANAR
-        self.shape: tuple[int, ...] = (
-            (camera.height * 3 // 2, camera.width)
-            if planar
-            else (camera.height, camera.width, _CHANNELS[self.pixel_format])
-        )
-        self._in_line = (1,) if planar else (_CHANNELS[self.pixel_format], 1)
+        self.shape: tuple[int, ...] = (camera.height * 3 // 2, camera.width)
+        self._in_line: tuple[int, ...] = (1,)
+        if channels := _CHANNELS.get(self.pixel_format):
+            self.shape, self._in_line = (camera.height, camera.width, channels), (channels, 1)
 
     def checked(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The image itself, if it can be read in place.

@@ -63,16 +63,13 @@ class TwoPlanes:
                 raise ConfigError("dof", list(places), f'a degree of freedom "{name}"')
         self._place = [places.get(name) for name in self.NAMES]
         self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
-        self._aside, self._along = (
-            math.sin(config.kinematics.skew),
-            math.cos(config.kinematics.skew),
-        )
+        skew = config.kinematics.skew
+        self._aside, self._along = math.sin(skew), math.cos(skew)
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
-        bend_x, bend_y, insertion, rotation = (
-            0.0 if place is None else float(q[place]) for place in self._place
-        )
+        values = (0.0 if place is None else float(q[place]) for place in self._place)
+        bend_x, bend_y, insertion, rotation = values
         bend_x, bend_y = bend_x - bend_y * self._aside, bend_y * self._along
         arc, turned = _arc(bend_x, bend_y, self._length)
         position = arc + turned[:, 2] * self._tip

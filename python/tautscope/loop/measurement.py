@@ -75,14 +75,9 @@ def raw_values(measurement: Measurement) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """A measurement and its model.
+    """Values (m,) of a measurement, their covariance (m, m), and a model of the sensor.
 
-    Attributes:
-        values: (m,).
-        covariance: (m, m).
-        model: Of values and derivatives.
-        predict: The values of the model alone.
-        point: How many values are one point.
+    `predict` is the model's values without derivatives; `point` is how many values are one point.
     """
 
     values: Floats
@@ -144,18 +139,18 @@ class Sensors:
         point: int = 1,
     ) -> Reading:
         """Reading of values (m,) by a model of the user's, with its Jacobian or by differences."""
-        derive = jacobian or partial(
-            jacobian_by_differences, partial(_predicted, predict, values), steps=STEP * self._widths
-        )
+
+        def checked(q: Floats) -> Floats:
+            return _shaped("predict(q)", predict(q), values.shape)
+
+        steps = STEP * self._widths
+        derive = jacobian or partial(jacobian_by_differences, checked, steps=steps)
 
         def model(q: Floats) -> tuple[Floats, Floats]:
-            rows = np.asarray(derive(q), dtype=np.float64)
-            if rows.shape != (len(values), len(q)):
-                shape = f"an array {(len(values), len(q))}"
-                raise SignalError("jacobian(q)", f"an array {rows.shape}", shape)
-            return _predicted(predict, values, q), rows
+            rows = _shaped("jacobian(q)", derive(q), (len(values), len(q)))
+            return checked(q), rows
 
-        return Reading(values, covariance, model, partial(_predicted, predict, values), point)
+        return Reading(values, covariance, model, checked, point)
 
     def _with(self, method: str, call: str) -> Kinematics:
         kinematics = self._kinematics
@@ -187,12 +182,11 @@ def check_rotation(orientation: ArrayLike) -> Floats:
     raise SignalError("orientation", found.tolist(), allowed)
 
 
-def _predicted(predict: Predict, values: Floats, q: Floats) -> Floats:
-    found = np.asarray(predict(q), dtype=np.float64)
-    if found.shape != values.shape:
-        shape = f"an array {values.shape}"
-        raise SignalError("predict(q)", f"an array {found.shape}", shape)
-    return found
+def _shaped(field: str, found: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    array = np.asarray(found, dtype=np.float64)
+    if array.shape != shape:
+        raise SignalError(field, f"an array {array.shape}", f"an array {shape}")
+    return array
 
 
 def _covariance(covariance: ArrayLike | None, std: NDArray[np.float64]) -> Floats:

@@ -11,9 +11,7 @@ from tautscope.errors import ConfigError
 def named_class(field: str, name: str, allowed: str) -> Any:
     """The class of ``module:Class``; the module may be in the working directory.
 
-    Raises:
-        ConfigError: There is no such module, or no such class in it; it names `field`, and what is
-            `allowed`.
+    If there is none, a `ConfigError` names `field`, and what is `allowed`.
     """
     module, _, attribute = name.partition(":")
     if not module or not attribute or module.startswith("."):

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, partial, wraps
+from itertools import compress
 from threading import RLock
-from typing import TYPE_CHECKING, Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,7 @@ from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.construction import build_loop
-from tautscope.loop.kinematics import Predict, build_kinematics
+from tautscope.loop.kinematics import Floats, Predict, build_kinematics
 from tautscope.loop.measurement import Measurement, Points, Pose, Reading, Sensors, Tip
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, advice, checksum, disabled_monitors
@@ -37,9 +38,7 @@ if TYPE_CHECKING:
     from tautscope import _core
     from tautscope.loop.vision import Detection, MarkerDetector
 
-Arguments = ParamSpec("Arguments")
-Loop = TypeVar("Loop", bound="HysteresisReduction")
-Result = TypeVar("Result")
+Method = TypeVar("Method", bound=Callable[..., Any])
 Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
@@ -161,17 +160,15 @@ class HysteresisEstimate:
     image_shift_std: NDArray[np.float64] | None = None
 
 
-def _exclusive(
-    call: Callable[Concatenate[Loop, Arguments], Result],
-) -> Callable[Concatenate[Loop, Arguments], Result]:
+def _exclusive(call: Method) -> Method:
     """A method that waits for those of other threads: measurements call models in Python."""
 
     @wraps(call)
-    def wait(loop: Loop, /, *arguments: Arguments.args, **keys: Arguments.kwargs) -> Result:
+    def wait(loop: HysteresisReduction, /, *arguments: Any, **keys: Any) -> Any:
         with loop._lock:
             return call(loop, *arguments, **keys)
 
-    return wait
+    return cast(Method, wait)
 
 
 class HysteresisReduction:
@@ -210,7 +207,7 @@ class HysteresisReduction:
         self._logged: set[str] = set()
         self._lasting: dict[str, int] = {}
         self._time = self._logged_at = math.nan
-        self._longest, self._has_logged_interval = 0.0, False
+        self._longest = 0.0
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -255,9 +252,8 @@ class HysteresisReduction:
             self._log_reaction(time, now)
             self._log_warnings(time, now)
             self._log_interval(time)
-        return self._loop.step(
-            values, time, made_at, None if self._actuators is None else self._within_limits
-        )
+        limit = None if self._actuators is None else self._within_limits
+        return self._loop.step(values, time, made_at, limit)
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state and the offsets, Eqs. (4)-(16).
@@ -286,13 +282,8 @@ class HysteresisReduction:
         """Second part of `on_frame`: the update with the result of `prepare_detection`."""
         captured_at = check_time("captured_at", frame.captured_at)
         found = any(detection.found)
-        return self._update(
-            detection.features if found else None,
-            detection.covariance if found else None,
-            captured_at,
-            detection,
-            checksum(frame.image),
-        )
+        features, covariance = (detection.features, detection.covariance) if found else (None, None)
+        return self._update(features, covariance, captured_at, detection, checksum(frame.image))
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
         """Image update with the features of your own marker detector.
@@ -571,18 +562,14 @@ class HysteresisReduction:
         result = self._loop.on_reading(*known, captured_at, reading.model, reading.point, sensor)
         return self._report(result, captured_at)
 
-    def _within_limits(
-        self, last: NDArray[np.float64], command: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _within_limits(self, last: Floats, command: Floats) -> Floats:
         assert self._actuators is not None
         excess = self._actuators.excess(command)
         if not excess or not np.isfinite(last).all():  # the rig refuses such a first command
             return command
         reached = self._actuators.limited(last, command)
-        held = (reached != command).tolist()
-        self._limited = tuple(
-            dof.label for dof, is_held in zip(self._config.dofs, held, strict=True) if is_held
-        )
+        held = compress(self._config.dofs, reached != command)
+        self._limited = tuple(dof.label for dof in held)
         if not self._limited_before.issuperset(self._limited):
             self._limited_before.update(self._limited)
             what = " and ".join(self._limited)
@@ -590,9 +577,8 @@ class HysteresisReduction:
         return reached
 
     def _log_reaction(self, time: float, now: Supervision) -> None:
-        if now.reaction.rank >= self._least_logged.rank and now.reaction not in self._logged:
-            self._logged.add(now.reaction)
-            _LOG.warning("at %.3f s: %s", time, now.effect)
+        if now.reaction.rank >= self._least_logged.rank:
+            self._log_once(now.reaction, "at %.3f s: %s", time, now.effect)
 
     def _log_warnings(self, time: float, now: Supervision) -> None:
         # Other reactions have a line of their own.
@@ -600,22 +586,25 @@ class HysteresisReduction:
         flags = now.flags if is_warning else ()
         self._lasting = {flag: self._lasting.get(flag, 0) + 1 for flag in flags}
         for flag, count in self._lasting.items():
-            if count == LASTING and flag not in self._logged:
-                self._logged.add(flag)
+            if count == LASTING:
                 ticks = LASTING * LOGGED_TICKS
-                _LOG.warning("at %.3f s: %s for %d ticks: %s", time, flag, ticks, advice(flag))
+                what = "at %.3f s: %s for %d ticks: %s"
+                self._log_once(flag, what, time, flag, ticks, advice(flag))
 
     def _log_interval(self, time: float) -> None:
         # Without the longest one: a pause is no interval.
         interval = (time - self._logged_at - self._longest) / (LOGGED_TICKS - 1)
         self._logged_at, self._longest = time, 0.0
         period = self._config.control.period
-        is_other = interval > 0 and abs(math.log(interval / period)) > OTHER_INTERVAL
-        if is_other and not self._has_logged_interval:
-            self._has_logged_interval = True
+        if interval > 0 and abs(math.log(interval / period)) > OTHER_INTERVAL:
             what = "control ticks come every %.4g s: set control.period to it. With %g s limits "
             what += "of speed are wrong by the ratio, and later ticks may move nothing"
-            _LOG.warning(what, interval, period)
+            self._log_once("interval", what, interval, period)
+
+    def _log_once(self, key: str, text: str, *values: object) -> None:
+        if key not in self._logged:
+            self._logged.add(key)
+            _LOG.warning(text, *values)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
@@ -624,8 +613,8 @@ class HysteresisReduction:
     @_exclusive
     def _update(
         self,
-        features: NDArray[np.float64] | None,
-        covariance: NDArray[np.float64] | None,
+        features: Floats | None,
+        covariance: Floats | None,
         captured_at: float,
         detection: Detection | None = None,
         image_checksum: int | None = None,

@@ -8,12 +8,13 @@ from operator import itemgetter
 from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tautscope.config import Config, ExperimentConfig, Sine
 from tautscope.dof import Dof, NamedDof
+from tautscope.loop.kinematics import Floats
 
-Value = TypeVar("Value", float, NDArray[np.float64])
+Value = TypeVar("Value", float, Floats)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class Motion(Protocol):
     def duration(self) -> float:
         """Duration [s]."""
 
-    def __call__(self, time: float) -> NDArray[np.float64]:
+    def __call__(self, time: float) -> Floats:
         """(n,) [m or rad] at `time` [s from its start]."""
 
 
@@ -96,7 +97,7 @@ class SineSequence:
         parts = (f"{each.dof.label} {each.start:g} to {each.end:g} s" for each in self.segments)
         return f"<SineSequence: {', '.join(parts)}>"
 
-    def __call__(self, time: float) -> NDArray[np.float64]:
+    def __call__(self, time: float) -> Floats:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         position = self._centre.copy()
         for dof, (segment, sine) in enumerate(zip(self.segments, self._sines, strict=True)):
@@ -155,13 +156,11 @@ class OperatorMotion:
 
     @property
     def _sines(self) -> Sequence[Sine]:
-        experiment = self.experiment
-        if isinstance(experiment, ExperimentConfig):
-            return [experiment[dof] for dof in Dof]
-        return experiment
+        given = self.experiment
+        return [given[dof] for dof in Dof] if isinstance(given, ExperimentConfig) else given
 
     @property
-    def _tremor(self) -> NDArray[np.float64]:
+    def _tremor(self) -> Floats:
         if isinstance(self.experiment, ExperimentConfig):
             return np.array(TREMOR)
         return np.array([TREMOR_SHARE * sine.amplitude for sine in self._sines])
@@ -184,7 +183,7 @@ class OperatorMotion:
             time, position = time + lasts + rest, target
         return moves
 
-    def __call__(self, time: float) -> NDArray[np.float64]:
+    def __call__(self, time: float) -> Floats:
         """(n,) [m or rad] at `time` [s from the start of the reference]."""
         position = np.empty(len(self._moves))
         for dof, moves in enumerate(self._moves):
@@ -203,17 +202,11 @@ class Move:
     in at least a time [s].
     """
 
-    def __init__(
-        self,
-        start: NDArray[np.float64],
-        end: NDArray[np.float64],
-        speed: NDArray[np.float64],
-        least: float,
-    ) -> None:
+    def __init__(self, start: Floats, end: Floats, speed: Floats, least: float) -> None:
         self._ends = start.copy(), end
         self.duration = max(least, MINIMUM_JERK_PEAK * float((np.abs(end - start) / speed).max()))
 
-    def __call__(self, time: float) -> NDArray[np.float64]:
+    def __call__(self, time: float) -> Floats:
         """(n,) [m or rad] at `time` [s from its start]."""
         return _minimum_jerk(*self._ends, time / self.duration)
 
@@ -247,7 +240,7 @@ class RecordedReference:
     def __repr__(self) -> str:
         return f"<RecordedReference: {len(self._time)} rows, {self.duration:g} s>"
 
-    def __call__(self, time: float) -> NDArray[np.float64]:
+    def __call__(self, time: float) -> Floats:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         if time < self.approach:
             return self._approach(time)

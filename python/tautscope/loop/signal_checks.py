@@ -12,12 +12,12 @@ from tautscope.errors import SignalError
 def check_features(values: ArrayLike) -> NDArray[np.float64]:
     """Features (4,) [px], each band finite, or NaN if not found, not both; else a `SignalError`."""
     features = as_numbers("features", values, "4 finite numbers")
-    if features.shape == (4,) and np.isnan(features).all():
-        allowed = "None where neither band was found, NaN for the features of one"
-        raise SignalError("features", features.tolist(), allowed)
     if features.shape != (4,):
         return check_signal("features", values, (4,))
     lost = np.isnan(features).reshape(2, 2).all(axis=1).repeat(2)
+    if lost.all():
+        allowed = "None where neither band was found, NaN for the features of one"
+        raise SignalError("features", features.tolist(), allowed)
     check_signal("features", np.where(lost, 0.0, features), (4,))
     return features
 

@@ -6,6 +6,7 @@ Pixel coordinates are OpenCV's: u to the right, v down, the centre of the first 
 import itertools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 import msgspec
@@ -36,8 +37,7 @@ class Region(NamedTuple):
     box: tuple[int, int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
-class BandScore:
+class BandScore(NamedTuple):
     """Scores of a band.
 
     For bands that were recognised by the intensity because blur has left no edges (decision 0011)
@@ -194,33 +194,34 @@ class MarkerDetector:
             FrameError: The image is not what the configured camera gives.
             SignalError: The prediction is not four numbers.
         """
-        predicted = _checked_prediction(predicted_features)
+        prior = self._prior(predicted_features, expectation)
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
-            self._layout.checked(image), self._prior(predicted, expectation)
+            self._layout.checked(image), prior
         )
-        a, b = (_band_score(row) for row in scores.tolist())
+        a, b = (BandScore._make((*row, (u, v))) for *row, u, v in scores.tolist())
         found = tuple(map(Region._make, regions))
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
     def _prior(
-        self, predicted: NDArray[np.float64] | None, expectation: StatePrediction | None
+        self, predicted_features: ArrayLike | None, expectation: StatePrediction | None
     ) -> tuple[NDArray[np.float64], ...] | None:
         """State (3,), standard deviations (3,) and geometry (3,); None if it may be anywhere."""
+        predicted = np.full(4, np.nan)
+        if predicted_features is not None:
+            allowed = "four numbers u_A, v_A, u_B, v_B [px]"
+            predicted = as_numbers("predicted_features", predicted_features, allowed)
+            if predicted.shape != (4,):
+                raise SignalError("predicted_features", predicted_features, allowed)
         if expectation is not None:
             known = (expectation.state, expectation.std, expectation.geometry)
             return tuple(map(np.asarray, known))
-        if predicted is None or not np.isfinite(predicted).all():
+        if not np.isfinite(predicted).all():
             return None
         starts, broad = self._starts
-        fits = [
-            fit
-            for start in starts
-            if (fit := self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)))
-        ]
-        if not fits:
-            return None
-        state, _ = min(fits, key=lambda fit: fit[1])
-        return state, self._start_deviation / 2, np.zeros(3)
+        std = np.full(4, 5.0)
+        fits = (self._model.nearest_state(start, broad, predicted, std) for start in starts)
+        best = min(filter(None, fits), key=itemgetter(1), default=None)
+        return None if best is None else (best[0], self._start_deviation / 2, np.zeros(3))
 
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
@@ -255,8 +256,7 @@ def workspace_starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.fl
             for sine, n in zip(sines, (2, 5, 2), strict=True)
         )
     )
-    centre = [sine.centre for sine in sines]
-    states = np.array([centre, *grid])
+    states = np.array([[sine.centre for sine in sines], *grid])
     return states, np.array([sine.amplitude for sine in sines])
 
 
@@ -288,20 +288,3 @@ def _workspace(config: Config) -> NDArray[np.float64]:
         for sine, n in zip(sines, (13, 45, 23), strict=True)
     )
     return np.array(list(itertools.product(*axes)))
-
-
-def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | None:
-    if predicted is None:
-        return None
-    allowed = "four numbers u_A, v_A, u_B, v_B [px]"
-    features = as_numbers("predicted_features", predicted, allowed)
-    if features.shape != (4,):
-        raise SignalError("predicted_features", predicted, allowed)
-    return features
-
-
-def _band_score(row: list[float]) -> BandScore:
-    inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, u, v = row
-    return BandScore(
-        inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, (u, v)
-    )

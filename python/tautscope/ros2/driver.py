@@ -69,11 +69,8 @@ class DriverRig:
     def step(self, command: ArrayLike) -> Sample:
         """Publish command (n,) [m or rad]; return at the end of the control period.
 
-        A tick that wakes late does not catch up.
-
-        Raises:
-            SignalError: The command is not n finite numbers.
-            DriveError: The driver is silent for `DRIVER_TIMEOUT`.
+        A tick that wakes late does not catch up. A driver that is silent for `DRIVER_TIMEOUT` is a
+        `DriveError`.
         """
         positions = check_signal("command", command, (len(self._joints),))
         stamp = self._clock.wall()

@@ -1,6 +1,6 @@
 """Checks of received messages, and conversion to what the loop takes.
 
-An error names the topic and the field; the message then changes nothing.
+A `MessageError` names the topic and the field; the message then changes nothing.
 """
 
 import math
@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
 from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Frame
 
-Floats = NDArray[np.float64]
 FUTURE = 5_000_000
 """How much later than this computer's clock a stamp may be [ns]."""
 ENCODINGS = {
@@ -48,12 +47,7 @@ class Stamps:
         self._source = None
 
     def check(self, header: Any, wall: int, source: bytes = b"") -> int:
-        """The stamp [ns since 1970] of a header that arrived at a wall clock time [ns].
-
-        Raises:
-            MessageError: It is 0 (CRTK: invalid data), no time, in the future, or not later than
-                the last one; or the publisher is not that of the message before.
-        """
+        """As `checked_stamp`, if it is later than the last one and of the same publisher."""
         if self._source not in (None, source):
             allowed = "the publisher that was the first after `enable` or `resume`"
             raise MessageError(f"{self._topic} publisher", source.hex(), allowed)
@@ -85,11 +79,7 @@ def checked_stamp(topic: str, header: Any, wall: int) -> int:
 
 
 def joint_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
-    """Positions (n,) [m or rad] of the joints in a JointState, in their order.
-
-    Raises:
-        MessageError: A joint is missing, doubled or unknown, or a position is not finite.
-    """
+    """Positions (n,) [m or rad] of the joints in a JointState, in their order, all of them."""
     if sorted(message.name) != sorted(joints):
         allowed = f"{', '.join(joints)}, in any order"
         raise MessageError(f"{topic} name", list(message.name)[:9], allowed)
@@ -101,11 +91,7 @@ def joint_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
 
 
 def known_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
-    """Positions (n,) [m or rad] of the joints in a JointState; NaN for one that is missing.
-
-    Raises:
-        MessageError: A joint is doubled or unknown, or a position is infinite.
-    """
+    """Positions (n,) [m or rad] of the joints in a JointState; NaN for one that is missing."""
     names, positions = list(message.name), message.position
     if not names or len(set(names)) < len(names) or not set(names) <= set(joints):
         raise MessageError(f"{topic} name", names[:9], f"of {', '.join(joints)}, each once")
@@ -120,23 +106,14 @@ def known_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class JoyAxes:
-    """Which axes and which button of a gamepad are used.
-
-    Attributes:
-        axes: Index in ``axes`` for each degree of freedom.
-        button: Index in ``buttons`` of the dead man's button.
-    """
+    """Index in ``axes`` for each degree of freedom, in ``buttons`` of the dead man's button."""
 
     axes: tuple[int, ...] = (1, 0, 4)
     button: int = 4
 
 
 def joy_deflection(topic: str, message: Any, layout: JoyAxes) -> tuple[Floats, bool]:
-    """Deflections (n,) from -1 to 1, and whether the dead man's button is held.
-
-    Raises:
-        MessageError: An axis or the button is missing, or a deflection is not from -1 to 1.
-    """
+    """Deflections (n,) from -1 to 1, and whether the dead man's button is held."""
     axes, buttons = message.axes, message.buttons
     for name, values, least in (
         ("axes", axes, max(layout.axes)),
@@ -161,11 +138,7 @@ class ImageReader:
             raise ConfigError("camera.pixel_format", camera.pixel_format, allowed)
 
     def read(self, message: Any, captured_at: float, sequence: int) -> Frame:
-        """The frame of an image, without a copy, captured at a time of the rig's clock [s].
-
-        Raises:
-            MessageError: It is not from the configured camera, or its size is not that of its data.
-        """
+        """The frame of an image, without a copy, captured at a time of the rig's clock [s]."""
         topic, camera = self._topic, self._camera
         encodings = ENCODINGS[camera.pixel_format]
         if message.encoding not in encodings:

@@ -57,16 +57,13 @@ class Lifecycle:
         self._change = change
         self._events = node.publisher("~/transition_event", "lifecycle_msgs/msg/TransitionEvent")
         states = {"available_states": [_state(state) for state in State]}
+        transitions = "GetAvailableTransitions"
         for name, kind, handler in (
             ("change_state", "ChangeState", self._change_state),
             ("get_state", "GetState", lambda _: {"current_state": _state(self.state)}),
             ("get_available_states", "GetAvailableStates", lambda _: states),
-            (
-                "get_available_transitions",
-                "GetAvailableTransitions",
-                lambda _: _descriptions(self.state),
-            ),
-            ("get_transition_graph", "GetAvailableTransitions", lambda _: _descriptions(*State)),
+            ("get_available_transitions", transitions, lambda _: _descriptions(self.state)),
+            ("get_transition_graph", transitions, lambda _: _descriptions(*State)),
         ):
             node.add_service(f"~/{name}", f"lifecycle_msgs/srv/{kind}", handler)
 
@@ -80,14 +77,12 @@ class Lifecycle:
 
     def _change_state(self, request: Any) -> dict[str, Any]:
         asked = request.transition
-        # As in rclcpp_lifecycle, a label has priority over the number.
-        found = [
-            each
-            for each in TRANSITIONS
-            if each.start is self.state
-            and (each.label == asked.label if asked.label else each.number == asked.id)
-        ]
-        return {"success": bool(found) and self.trigger(found[0])}
+        for each in TRANSITIONS:
+            # As in rclcpp_lifecycle, a label has priority over the number.
+            is_asked = each.label == asked.label if asked.label else each.number == asked.id
+            if is_asked and each.start is self.state:
+                return {"success": self.trigger(each)}
+        return {"success": False}
 
 
 def _descriptions(*starts: State) -> dict[str, Any]:

@@ -8,9 +8,10 @@ import numpy as np
 
 from tautscope.config import Config, TopicConfig
 from tautscope.errors import MessageError, SignalError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement, Pose, Tip, check_rotation
 from tautscope.loop.signal_checks import check_covariance
-from tautscope.ros2.inputs import Floats, known_positions
+from tautscope.ros2.inputs import known_positions
 
 KINDS = {
     "JointState": "sensor_msgs/msg/JointState",
@@ -28,14 +29,14 @@ class MeasurementReader:
         self._settings: TopicConfig = config.measurement.topics[sensor]
         self._joints = [dof.label for dof in config.dofs]
         self._sensor, self._topic = sensor, topic
+        self.reset()
+
+    def reset(self) -> None:
+        """Take the frame of the next message, unless one is configured."""
         self._frame = self._settings.frame
 
     def read(self, message: Any, captured_at: float) -> Measurement | None:
-        """The measurement of a message, of a time of the rig's clock [s]; None if it is all NaN.
-
-        Raises:
-            MessageError: Wrong are the frame, the names, a quaternion, a number or the covariance.
-        """
+        """The measurement of a message, of a time of the rig's clock [s]; None if it is all NaN."""
         topic = self._topic
         if self._settings.type == "JointState":
             values = known_positions(topic, message, self._joints)

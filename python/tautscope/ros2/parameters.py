@@ -55,12 +55,8 @@ class Parameters:
         return {"types": [self._value(name).get("type", 0) for name in request.names]}
 
     def _list(self, request: Any) -> dict[str, Any]:
-        names = [
-            name
-            for name in self._values
-            if not request.prefixes
-            or any(name == prefix or name.startswith(f"{prefix}.") for prefix in request.prefixes)
-        ]
+        begins = tuple(f"{prefix}." for prefix in request.prefixes)
+        names = [name for name in self._values if not begins or f"{name}.".startswith(begins)]
         prefixes = sorted({name.rpartition(".")[0] for name in names if "." in name})
         return {"result": {"names": names, "prefixes": prefixes}}
 

@@ -4,20 +4,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Command, Received, Servo
 from tautscope.console.operator_input import DEAD_BAND, OperatorInput
 from tautscope.errors import MessageError
+from tautscope.loop.kinematics import Floats
 from tautscope.loop.operating_state import OperatingState, StateMachine
 from tautscope.ros2.endpoints import Refuse
 from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
 from tautscope.ros2.session import Clock, Node
 from tautscope.ros2.wire import Qos
 
-Floats = NDArray[np.float64]
 QUEUE = 10
 """Number of references that wait for a tick; it takes the newest."""
 

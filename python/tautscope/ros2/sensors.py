@@ -24,19 +24,22 @@ class Sensors:
 
     def __init__(self, config: Config, node: Node, clock: Clock, refuse: Refuse) -> None:
         self._clock, self._refuse = clock, refuse
-        self._config = config
         # Best effort also receives what a publisher sends reliably.
         quality = Qos(depth=QUEUE, is_reliable=False)
         self._topics = [
             node.subscription(topic.name, KINDS[topic.type], quality)
             for topic in config.measurement.topics
         ]
-        self._make_readers()
+        self._readers = [
+            MeasurementReader(config, sensor, topic.topic)
+            for sensor, topic in enumerate(self._topics)
+        ]
 
     def reset(self) -> None:
         """Discard what arrived before, and take the next messages' frames."""
         self.take(0.0)
-        self._make_readers()
+        for reader in self._readers:
+            reader.reset()
 
     def take(self, now: float) -> tuple[Measurement, ...]:
         """What has arrived since the last call, at a time of the rig's clock [s]."""
@@ -52,9 +55,3 @@ class Sensors:
         wall = self._clock.wall()
         age = wall - checked_stamp(topic, message.header, wall)
         return reader.read(message, now - age / 1e9)
-
-    def _make_readers(self) -> None:
-        self._readers = [
-            MeasurementReader(self._config, sensor, topic.topic)
-            for sensor, topic in enumerate(self._topics)
-        ]

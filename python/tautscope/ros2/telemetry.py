@@ -153,13 +153,13 @@ class Telemetry:
                 "log": run.path,
                 "dropped by the log": run.log.dropped,
             }
-        self._diagnostics.publish(
-            fields.diagnostics(
-                header_of(self._clock.wall(), ""),
-                values,
-                level=ERROR if fault else WARN if flags else OK,
-                name=self._name,
-                message=fault or ", ".join(flags) or state,
-                hardware_id="tautscope",
-            )
-        )
+        level = ERROR if fault else WARN if flags else OK
+        message = fault or ", ".join(flags) or state
+        status = {
+            "level": level,
+            "name": self._name,
+            "message": message,
+            "hardware_id": "tautscope",
+        }
+        header = header_of(self._clock.wall(), "")
+        self._diagnostics.publish(fields.diagnostics(header, values, **status))

@@ -21,36 +21,22 @@ MESSAGES = {
 }
 """Messages that are not part of ROS 2 -> definition."""
 SERVICES = {
-    "lifecycle_msgs/srv/ChangeState": ("lifecycle_msgs/Transition transition", "bool success"),
-    "lifecycle_msgs/srv/GetState": ("", "lifecycle_msgs/State current_state"),
-    "lifecycle_msgs/srv/GetAvailableStates": ("", "lifecycle_msgs/State[] available_states"),
-    "lifecycle_msgs/srv/GetAvailableTransitions": (
-        "",
-        "lifecycle_msgs/TransitionDescription[] available_transitions",
-    ),
-    "rcl_interfaces/srv/DescribeParameters": (
-        "string[] names",
-        "rcl_interfaces/ParameterDescriptor[] descriptors",
-    ),
-    "rcl_interfaces/srv/GetParameters": (
-        "string[] names",
-        "rcl_interfaces/ParameterValue[] values",
-    ),
-    "rcl_interfaces/srv/GetParameterTypes": ("string[] names", "uint8[] types"),
-    "rcl_interfaces/srv/ListParameters": (
-        "string[] prefixes\nuint64 depth",
-        "rcl_interfaces/ListParametersResult result",
-    ),
-    "rcl_interfaces/srv/SetParameters": (
-        "rcl_interfaces/Parameter[] parameters",
-        "rcl_interfaces/SetParametersResult[] results",
-    ),
-    "rcl_interfaces/srv/SetParametersAtomically": (
-        "rcl_interfaces/Parameter[] parameters",
-        "rcl_interfaces/SetParametersResult result",
-    ),
+    "lifecycle_msgs": {
+        "ChangeState": ("Transition transition", "bool success"),
+        "GetState": ("", "State current_state"),
+        "GetAvailableStates": ("", "State[] available_states"),
+        "GetAvailableTransitions": ("", "TransitionDescription[] available_transitions"),
+    },
+    "rcl_interfaces": {
+        "DescribeParameters": ("string[] names", "ParameterDescriptor[] descriptors"),
+        "GetParameters": ("string[] names", "ParameterValue[] values"),
+        "GetParameterTypes": ("string[] names", "uint8[] types"),
+        "ListParameters": ("string[] prefixes\nuint64 depth", "ListParametersResult result"),
+        "SetParameters": ("Parameter[] parameters", "SetParametersResult[] results"),
+        "SetParametersAtomically": ("Parameter[] parameters", "SetParametersResult result"),
+    },
 }
-"""Services -> definitions of request and response."""
+"""Package -> service -> definitions of request and response, with types of the package."""
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 
 
@@ -60,8 +46,10 @@ def _register() -> None:
         known.register(get_types_from_msg(text, name))
     # A char of ROS is a uint8 in the description that the hash is of.
     info = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\n"
-    known.fielddefs[_EVENT_INFO] = ([], _fields(info + "int64 sequence_number"))
-    for name, (request, response) in SERVICES.items():
+    known.fielddefs[_EVENT_INFO] = ([], _fields("service_msgs", info + "int64 sequence_number"))
+    found = ((package, *one) for package, each in SERVICES.items() for one in each.items())
+    for package, service, (request, response) in found:
+        name = f"{package}/srv/{service}"
         event: list[tuple[str, FieldDesc]] = [("info", (Nodetype.NAME, _EVENT_INFO))]
         members: list[tuple[str, FieldDesc]] = []
         for part in ("request", "response", "event"):
@@ -69,8 +57,8 @@ def _register() -> None:
             event.append((part, (Nodetype.SEQUENCE, ((Nodetype.NAME, kind), 1))))
             members.append((f"{part}_message", (Nodetype.NAME, kind)))
         types: Typesdict = {
-            f"{name}_Request": ([], _fields(request)),
-            f"{name}_Response": ([], _fields(response)),
+            f"{name}_Request": ([], _fields(package, request)),
+            f"{name}_Response": ([], _fields(package, response)),
             # What introspection of a service publishes is a part of its hash (REP 2016).
             f"{name}_Event": ([], event[:-1]),
             name: ([], members),
@@ -78,10 +66,10 @@ def _register() -> None:
         known.register(types)
 
 
-def _fields(text: str) -> list[tuple[str, FieldDesc]]:
+def _fields(package: str, text: str) -> list[tuple[str, FieldDesc]]:
     if not text:  # the definition language of ROS gives an empty message this member
         text = "uint8 structure_needs_at_least_one_member"
-    return next(iter(get_types_from_msg(text, "tautscope/msg/Part").values()))[1]
+    return next(iter(get_types_from_msg(text, f"{package}/msg/Part").values()))[1]
 
 
 @cache

@@ -68,9 +68,8 @@ class Identity:
 
     def _token(self, number: int, entity: Entity) -> str:
         namespace = _mangled(self.namespace) or "%"
-        return (
-            f"@ros2_lv/{self.domain}/{self.session}/0/{number}/{entity}/%/{namespace}/{self.name}"
-        )
+        place = f"{self.domain}/{self.session}/0/{number}/{entity}"
+        return f"@ros2_lv/{place}/%/{namespace}/{self.name}"
 
 
 def key(domain: int, topic: str, kind: str, rihs: str) -> str:
