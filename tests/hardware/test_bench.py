@@ -235,7 +235,7 @@ def test_a_recorded_motion_runs_on_the_rig(
     rig: tuple[Config, Path, Lines], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The files of the pictures suffice.
-    monkeypatch.setattr("tautscope.report.recorded_run.figure_list", lambda pictures: "")
+    monkeypatch.setattr("tautscope.report.report.figure_list", lambda pictures: "")
     config, _, lines = rig
     time = np.linspace(5, 6.5, 40)
     centre = np.array([config.experiment[dof].centre for dof in Dof])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tautscope.calibration.bands.motion import MOST_IMAGES, ImageSequence
-from tautscope.commands.recorded_motion import read_motion
+from tautscope.commands.positions import read_motion
 from tautscope.errors import MissingPathError
 from tautscope.log.reader import Update, read_log
 from tautscope.log.writer import LogSummary

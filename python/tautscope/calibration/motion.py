@@ -115,16 +115,11 @@ def move_rig(
     with the configured geometry are off, because a calibration does not know it: the command is
     the reference.
 
-    Args:
-        rig: It is reset first; the caller closes it.
-        config: Configuration of the rig.
-        motion: The reference.
-        progress: Of the motion.
+    The rig is reset first; the caller closes it.
 
     Raises:
         MotionHeldError: Motion was held for a second: nobody can re-engage it.
         SignalError: The rig's clock does not advance, or a sample is not as `Sample` says.
-        TautscopeError: Errors of the rig.
     """
     off = tuple(dict.fromkeys([*config.safety.off, *_IMAGE_DETECTORS]))
     loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
@@ -201,11 +196,7 @@ class ImageRecorder(ABC):
         self._due = captured_at + self.period - 1e-9
 
     def check_is_complete(self, images: int) -> None:
-        """Check that there are positions, and `images` that were kept.
-
-        Raises:
-            RecordError: There is no motor position or no image.
-        """
+        """Check that there are positions, and `images` that were kept."""
         if not self.ticks or not images:
             found = f"{len(self.ticks)} motor positions and {images} images"
             raise RecordError("recording", found, "both, of the same motion")

@@ -41,9 +41,7 @@ class CalibrationResult:
         """The values and the record of the calibration, for `write_values` and `Config.replace`.
 
         An infinite standard deviation, that of a value which is not determined, is not recorded.
-
-        Args:
-            at: When it was done; now by default.
+        The date is that of `at`, by default now.
         """
         record: dict[str, Any] = {
             "date": (at or datetime.now(UTC)).isoformat(timespec="seconds"),

@@ -5,17 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands import arguments
-from tautscope.commands.positions import (
-    add_video_options,
-    align_video_options,
-    check_video_options,
-    read_positions,
-)
+from tautscope.commands import arguments, positions
 from tautscope.commands.printing import print_json
 
 if TYPE_CHECKING:
-    from tautscope.calibration.delay import DelayEstimate, Probe
+    from tautscope.calibration.delay import DelayEstimate
 
 NO_ANSWER = 1
 
@@ -32,7 +26,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "an answer the exit status is 1. The motors must have stopped or turned several times.",
         extras=["hardware"],
     )
-    add_video_options(align, "about the time of the video's first frame in the motors' [s]")
+    positions.add_video_options(
+        align, "about the time of the video's first frame in the motors' [s]"
+    )
     align.add_argument(
         "--within",
         type=arguments.above_zero,
@@ -48,7 +44,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.log.alignment import align_recording, implausible_motors  # noqa: PLC0415
     from tautscope.log.reader import read_log  # noqa: PLC0415
 
-    check_video_options(options)
+    positions.check_video_options(options)
     if options.video is None:
         arguments.refuse_unused(options, "--video: a log has its configuration", "config")
     document: dict[str, Any] = {}
@@ -60,8 +56,8 @@ def _run(options: argparse.Namespace) -> int:
         remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
     else:
         config = arguments.article_config(options.config)
-        motors = read_positions(options.motors, options.units, config)
-        found, stamps = align_video_options(options, config, motors, limit=options.within)
+        motors = positions.read_positions(options.motors, options.units, config)
+        found, stamps = positions.align_video_options(options, config, motors, limit=options.within)
         start = float(stamps[0]) - found.delay
         document["video_start"] = start if found.is_known else None
         remedy = f"The first image shows the motors at {start:.3f} s: --video-start {start:.3f}"
@@ -91,12 +87,8 @@ def print_delay(found: DelayEstimate) -> None:
         print(f"No answer: {found.reason}.")
     for name, probe in (("model", found.model), ("turning points", found.turning_points)):
         if probe is not None:
-            print(_probe_line(name, probe))
-
-
-def _probe_line(name: str, probe: Probe) -> str:
-    return (
-        f"  {name}: {probe.middle:.3f} s in the middle of the record (std {probe.delay_std:.3f} s),"
-        f" drift {1e6 * probe.drift:.0f} ppm (std {1e6 * probe.drift_std:.0f} ppm),"
-        f" from {probe.parts} parts"
-    )
+            print(
+                f"  {name}: {probe.middle:.3f} s in the middle of the record "
+                f"(std {probe.delay_std:.3f} s), drift {1e6 * probe.drift:.0f} ppm "
+                f"(std {1e6 * probe.drift_std:.0f} ppm), from {probe.parts} parts"
+            )

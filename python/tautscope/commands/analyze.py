@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from tautscope.commands import analyze_episodes, arguments
+from tautscope.commands import arguments
+from tautscope.commands.analyze_episodes import analyze_episodes
 from tautscope.commands.analyze_output import print_columns, print_results, results_to_json
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import load_config
@@ -98,7 +99,18 @@ def add_parser(verbs: arguments.Verbs) -> None:
         action="store_true",
         help="exit status 1 if the compensator would not help in each degree of freedom",
     )
-    analyze_episodes.add_arguments(analyze)
+    analyze.add_argument(
+        "--episode",
+        type=arguments.natural,
+        metavar="N",
+        help="one episode of a data set, in full [the slack of all episodes]",
+    )
+    analyze.add_argument(
+        "--workers",
+        type=arguments.positive,
+        metavar="N",
+        help="processes for the episodes of a data set [all cores]",
+    )
     arguments.add_out(analyze, "analyze")
     arguments.add_config(analyze)
     arguments.add_json(analyze)
@@ -133,7 +145,7 @@ def _run(options: argparse.Namespace) -> int:
             options.usage_error(f"--{name} has a column twice: each degree of freedom has its own")
     if episodes and options.episode is None:
         names = _names([sheet.titles[sheet.index(tip)] for tip in options.measured])
-        analyze_episodes.analyze_episodes(options, episodes, names)
+        analyze_episodes(options, episodes, names)
         return 0
     arguments.refuse_unused(options, "no --episode", "workers")
     folder = arguments.out_folder(options)
@@ -166,7 +178,8 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
     from tautscope.analysis.verdict import judge, together  # noqa: PLC0415
 
     config = load_config(options.config)
-    tips = sheet if options.tip_file is None else open_table(options.tip_file)
+    other = None if options.tip_file is None else open_table(options.tip_file)
+    tips = sheet if other is None else other
     time = options.time or time_column(sheet.titles)
     pairs = list(zip(options.command, options.measured, strict=True))
     names = _names([tips.titles[tips.index(tip)] for _, tip in pairs])
@@ -179,25 +192,15 @@ def _results(options: argparse.Namespace, sheet: Sheet) -> list[tuple[Verdict, A
 
             try:
                 record = read_record(
-                    sheet,
-                    command,
-                    tip,
-                    time,
-                    tip_path=None if options.tip_file is None else tips,
-                    missing=options.missing,
+                    sheet, command, tip, time, tip_path=other, missing=options.missing
                 )
                 verdict = judge(record, names[index], (command, tip))
             except RecordError as error:
                 if len(pairs) > 1:
                     error.add_note(f"of command {command} and measured {tip}")
                 raise
-            analysis = analyze(
-                verdict.record,
-                config,
-                options.update_distance,
-                options.gain,
-                progress=report,
-            )
+            distance, gain = options.update_distance, options.gain
+            analysis = analyze(verdict.record, config, distance, gain, progress=report)
             results.append((verdict, analysis))
     verdicts = together([verdict for verdict, _ in results])
     return [(verdict, analysis) for verdict, (_, analysis) in zip(verdicts, results, strict=True)]

@@ -13,22 +13,6 @@ from tautscope.runs.episodes import Episode
 from tautscope.runs.output_folder import new_folder
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options for data sets."""
-    parser.add_argument(
-        "--episode",
-        type=arguments.natural,
-        metavar="N",
-        help="one episode of a data set, in full [the slack of all episodes]",
-    )
-    parser.add_argument(
-        "--workers",
-        type=arguments.positive,
-        metavar="N",
-        help="processes for the episodes of a data set [all cores]",
-    )
-
-
 def analyze_episodes(
     options: argparse.Namespace, episodes: Sequence[Episode], names: Sequence[str]
 ) -> None:

@@ -24,17 +24,10 @@ def print_columns(
     """Print the columns with their ranges, those left out, and commands to continue with."""
     import shlex  # noqa: PLC0415
 
-    rows = [
-        (
-            str(each.number),
-            each.title,
-            each.unit,
-            str(each.count),
-            f"{each.least:.6g}",
-            f"{each.largest:.6g}",
-        )
-        for each in columns
-    ]
+    rows = []
+    for each in columns:
+        extent = f"{each.least:.6g}", f"{each.largest:.6g}"
+        rows.append((str(each.number), each.title, each.unit, str(each.count), *extent))
     print_table(("number", "title", "unit", "values", "least", "largest"), rows, left=(1, 2))
     screen = console()
     for error in left_out:

@@ -25,15 +25,9 @@ def add_verb(
     description: str,
     extras: Sequence[str] = (),
 ) -> argparse.ArgumentParser:
-    """Add a verb to the command line.
+    """Add a verb; `run` takes its options and returns the exit status, None has verbs of its own.
 
-    Args:
-        verbs: The verbs so far.
-        name: Its name.
-        run: What it does with its options; the exit status. None of a verb with verbs of its own.
-        help: One line for the list of verbs.
-        description: Text of its own ``--help``.
-        extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
+    `tautscope.cli.main` first checks that the `extras` of the package are installed.
     """
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
     # Of itself argparse takes a negative number with an exponent for an option.
@@ -57,15 +51,9 @@ def add_verbose(parser: argparse.ArgumentParser, default: int | str = 0) -> None
 
 
 def refuse_unused(options: argparse.Namespace, allowed: str, *names: str) -> None:
-    """Refuse options that would have no effect.
+    """Refuse options, of which a verb may lack some, that would have no effect.
 
-    Args:
-        options: Of a verb.
-        allowed: What they need beside them, for the error.
-        names: Their attributes; a verb may lack some.
-
-    Raises:
-        FieldError: One of them has another value than by default.
+    `allowed` is what they need beside them, for the error.
     """
     for name in names:
         value = getattr(options, name, None)
@@ -92,11 +80,7 @@ def add_config(
 def article_config(
     path: str | PathLike[str] | None = None, profile: Profile | None = None
 ) -> Config:
-    """As `load_config`, of the article's instrument, which most commands are for.
-
-    Raises:
-        ConfigError: As `load_config`; the configuration has [[dof]].
-    """
+    """As `load_config`, of the article's instrument, which most commands are for."""
     config = load_config(path, profile)
     if config.dof:
         found = ", ".join(dof.name for dof in config.dof)
@@ -123,11 +107,7 @@ def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
 
 
 def out_folder(options: argparse.Namespace) -> Path:
-    """The folder of ``--out``, or one with date and verb in its name.
-
-    Raises:
-        OutputError: It is not empty, or cannot be written.
-    """
+    """The folder of ``--out``, or one with date and verb in its name; it can be written."""
     return check_free(options.out or default_folder(options.verb))
 
 
@@ -138,43 +118,34 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def natural(text: str) -> int:
-    """An integer of at least 0."""
-    return _integer(text, 0)
+def _integer(least: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            what = f"got {text!r}, expected an integer of at least {least}"
+            raise argparse.ArgumentTypeError(what)
+        return int(text)
+
+    return parse
 
 
-def positive(text: str) -> int:
-    """An integer of at least 1."""
-    return _integer(text, 1)
+def _number(
+    expected: str, is_allowed: Callable[[float], bool] = math.isfinite
+) -> Callable[[str], float]:
+    """What reads a finite number that is allowed."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and is_allowed(value)):
+            raise argparse.ArgumentTypeError(f"got {text!r}, expected {expected}")
+        return value
+
+    return parse
 
 
-def _integer(text: str, least: int) -> int:
-    if not text.isdecimal() or int(text) < least:
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected an integer of at least {least}")
-    return int(text)
-
-
-def above_zero(text: str) -> float:
-    """A finite number above 0."""
-    return _number(text, "a number above 0", lambda value: value > 0)
-
-
-def not_zero(text: str) -> float:
-    """A finite number other than 0."""
-    return _number(text, "a number other than 0", lambda value: value != 0)
-
-
-def seconds(text: str) -> float:
-    """A finite number."""
-    return _number(text, "a number of seconds", math.isfinite)
-
-
-def _number(text: str, expected: str, is_allowed: Callable[[float], bool]) -> float:
-    """The finite number in a text, if it is allowed."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and is_allowed(value)):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected {expected}")
-    return value
+natural, positive = _integer(0), _integer(1)
+above_zero = _number("a number above 0", lambda value: value > 0)
+not_zero = _number("a number other than 0", lambda value: value != 0)
+seconds = _number("a number of seconds")

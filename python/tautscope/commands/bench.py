@@ -119,11 +119,7 @@ def _bench(options: argparse.Namespace) -> None:
 
 
 def _check_faults(bench: Bench, faults: Iterable[tuple[float, str]]) -> None:
-    """Check that a bench has the faults of ``--faults``.
-
-    Raises:
-        ConfigError: It has not.
-    """
+    """Check that a bench has the faults of ``--faults``."""
     from tautscope.bench.camera import FAULTS  # noqa: PLC0415
 
     kinds = dict.fromkeys((dof.label for dof in Dof), bench.drives.kinds) | {"camera": FAULTS}

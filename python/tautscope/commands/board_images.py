@@ -45,23 +45,13 @@ class BoardImages:
 
 
 def file_images(files: Sequence[Path]) -> BoardImages:
-    """Images of image files, or of one video.
-
-    Raises:
-        MissingPathError: A file does not exist.
-        FieldError: A file is no image, or no video.
-    """
+    """Images of image files, or of one video."""
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) == 1 and files[0].suffix.lower() not in _SUFFIXES:
         return _video_images(files[0])
-    first = read_image(files[0])
-
-    def read() -> Generator[Image]:
-        for file in files:
-            yield read_image(file)
-
-    return BoardImages((first.shape[1], first.shape[0]), read())
+    height, width = read_image(files[0]).shape[:2]
+    return BoardImages((width, height), (read_image(file) for file in files))
 
 
 def live_images(config: Config, seconds: float) -> BoardImages:
@@ -91,24 +81,15 @@ def twin_images(config: Config, board: Board) -> BoardImages:
 
     texture = board.texture(_PIXELS_PER_MODULE)
     extent = board.columns * board.square, board.rows * board.square
-
-    def read() -> Generator[Image]:
-        camera = BoardCamera(config, texture, board.square / (MODULES * _PIXELS_PER_MODULE))
-        poses = random_poses(config.camera, extent, _MOST_TWIN_IMAGES, config.twin.seed)
-        for sequence, pose in enumerate(poses):
-            yield camera.draw(*pose, sequence)
-
-    return BoardImages((config.camera.width, config.camera.height), read(), is_live=True)
+    camera = BoardCamera(config, texture, board.square / (MODULES * _PIXELS_PER_MODULE))
+    poses = random_poses(config.camera, extent, _MOST_TWIN_IMAGES, config.twin.seed)
+    images = (camera.draw(*pose, sequence) for sequence, pose in enumerate(poses))
+    return BoardImages((config.camera.width, config.camera.height), images, is_live=True)
 
 
 def _video_images(file: Path) -> BoardImages:
     with open_video_file(str(file)) as container:
         stream = container.streams.video[0]
         size = stream.width, stream.height
-    camera = CameraConfig(width=size[0], height=size[1])
-
-    def read() -> Generator[Image]:
-        for frame in read_video(str(file), camera):
-            yield frame.image
-
-    return BoardImages(size, read(), is_stream=True)
+    frames = read_video(str(file), CameraConfig(width=size[0], height=size[1]))
+    return BoardImages(size, (frame.image for frame in frames), is_stream=True)

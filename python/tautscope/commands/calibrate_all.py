@@ -8,17 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments
+from tautscope.commands import arguments, calibration_rig
 from tautscope.commands.calibrate_camera import add_board_options
-from tautscope.commands.calibration_rig import (
-    add_rig_options,
-    check_rig_options,
-    refuse_wrong_limits,
-    twin_seed,
-)
 from tautscope.commands.calibration_session import CalibrationSession
-from tautscope.commands.printing import print_json
-from tautscope.commands.question import ask
+from tautscope.commands.printing import ask, print_json
 from tautscope.config import Config
 from tautscope.errors import TautscopeError, described
 from tautscope.runs.output_folder import check_free, default_folder
@@ -45,7 +38,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     arguments.add_config(every, required=True)
     add_board_options(every)
-    add_rig_options(every)
+    calibration_rig.add_options(every)
     every.add_argument(
         "--skip", action="append", choices=_NAMES, default=[], help="leave out a step; repeatable"
     )
@@ -59,13 +52,13 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
 
-    check_rig_options(options)
+    calibration_rig.check_options(options)
     if options.twin:
         arguments.refuse_unused(options, "the live camera, whose time limit it is", "seconds")
     config = arguments.article_config(options.config)
-    seed = options.seed = twin_seed(options, config) if options.twin else None
+    seed = options.seed = calibration_rig.twin_seed(options, config) if options.twin else None
     if not options.twin:
-        refuse_wrong_limits(options.config)
+        calibration_rig.refuse_wrong_limits(options.config)
     folder = options.out or default_folder("calibrate")
     session = CalibrationSession(Path(options.config), folder, seed, restart=options.restart)
     if not session.state.done:
@@ -91,19 +84,17 @@ def _run(options: argparse.Namespace) -> int:
 def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) -> bool:
     """Do or skip a step; False if the user stops."""
     result: CalibrationResult | None = None
-    while True:
+    while result is None:
         answer = "s" if step.name in options.skip else _answer(options, session.config)
         if answer == "q":
             return False
         if answer == "s":
             break
+        # The answer was the question whether the motors may move.
+        changes = {"yes": True, "drawn": session.state.drawn}
+        confirmed = argparse.Namespace(**vars(options) | changes)
         try:
-            # The answer was the question whether the motors may move.
-            confirmed = argparse.Namespace(
-                **{**vars(options), "yes": True, "drawn": session.state.drawn}
-            )
             result = step.run(confirmed, session.config, session.folder)
-            break
         except TautscopeError as error:
             if options.yes or options.twin:
                 raise

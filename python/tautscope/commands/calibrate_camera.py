@@ -1,30 +1,17 @@
 """The command ``tautscope calibrate camera``."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments
-from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
-from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import (
-    add_twin,
-    check_rig_options,
-    twin_config,
-    twin_device,
-)
+from tautscope.commands import arguments, calibration_output, calibration_rig
+from tautscope.commands.board_images import file_images, live_images, twin_images
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 from tautscope.runs.output_folder import check_free_file, new_file
-
-if TYPE_CHECKING:
-    from tautscope.calibration.camera.board import Board
 
 _MODELS = ("pinhole", "fisheye")
 
@@ -56,8 +43,8 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera.add_argument(
         "--ros", type=Path, metavar="FILE", help="also write a ROS camera_info file"
     )
-    add_twin(camera, "show a simulated board to the twin's camera")
-    add_options(camera)
+    calibration_rig.add_twin(camera, "show a simulated board to the twin's camera")
+    calibration_output.add_options(camera)
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
@@ -107,15 +94,15 @@ def _run(options: argparse.Namespace) -> None:
         arguments.refuse_unused(options, "images of a board", "columns", "rows", "square", "model")
     if options.files or options.twin:
         arguments.refuse_unused(options, "the live camera, whose time limit it is", "seconds")
-    check_rig_options(options, is_motion=not options.files)
-    check_options(options, reads_config=not options.files)
+    calibration_rig.check_options(options, is_motion=not options.files)
+    calibration_output.check_options(options, reads_config=not options.files)
     if options.ros is not None:
         check_free_file(options.ros)
     if is_imported:
         result, info = _import(options.files[0])
     else:
         result, info = calibrate(options, options.files)
-    finish(options, result)
+    calibration_output.finish(options, result)
     if options.ros is not None:  # what is printed already is not lost by an error
         with new_file(options.ros) as partial:
             partial.write_text(info, encoding="utf-8")
@@ -136,7 +123,16 @@ def calibrate(
     from tautscope.calibration.camera.result import camera_result  # noqa: PLC0415
 
     board = Board(options.columns, options.rows, options.square)
-    images = file_images(files) if files else _camera_images(options, board)
+    config = None if files else arguments.article_config(options.config)
+    if config is None:
+        images = file_images(files)
+    elif options.twin:
+        images = twin_images(calibration_rig.twin_config(options, config), board)
+        images = replace(images, serial_numbers=calibration_rig.twin_device(options, config))
+    elif options.config is None:
+        raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
+    else:
+        images = live_images(config, options.seconds)
     collector = ViewCollector(board, images.size, is_stream=images.is_stream)
     try:
         for image in images.images:
@@ -150,16 +146,6 @@ def calibrate(
     fit = fit_intrinsics(collector.views, images.size, options.model)
     result = camera_result(fit, collector.coverage, images.serial_numbers)
     return result, camera_info(fit.intrinsics)
-
-
-def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
-    config = arguments.article_config(options.config)
-    if options.twin:
-        images = twin_images(twin_config(options, config), board)
-        return replace(images, serial_numbers=twin_device(options, config))
-    if options.config is None:
-        raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
-    return live_images(config, options.seconds)
 
 
 def _import(file: Path) -> tuple[CalibrationResult, str]:

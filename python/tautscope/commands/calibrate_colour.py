@@ -3,28 +3,57 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+import base64
+import shlex
+from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments
-from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import (
-    add_rig_options,
-    check_rig_options,
-    rig_for_calibration,
-)
+from tautscope.commands import arguments, calibration_output, calibration_rig, positions
 from tautscope.commands.printing import print_json, progress_bar
-from tautscope.commands.recorded_motion import (
-    add_motor_options,
-    check_motor_options,
-    read_motion,
-)
 from tautscope.errors import FieldError
+from tautscope.runs.output_folder import check_free_file
 
 if TYPE_CHECKING:
     from tautscope.calibration.bands.labels import LabelledImage
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>tautscope: click on the bands</title>
+<style>
+body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem; }
+canvas { max-width: 100%; cursor: crosshair; }
+pre { background: #f6f6f6; padding: .8rem 1rem; white-space: pre-wrap; user-select: all; }
+</style></head><body>
+<p>Click into the middle of each of the two bands; a third click begins anew.
+Then copy the command.</p>
+<canvas></canvas>
+<pre data-command="COMMAND"></pre>
+<script>
+const canvas = document.querySelector("canvas"), line = document.querySelector("pre");
+const image = new Image(), context = canvas.getContext("2d");
+let clicks = [];
+function draw() {
+  context.drawImage(image, 0, 0);
+  context.strokeStyle = "yellow";
+  for (const [u, v] of clicks) {
+    context.strokeRect(u - 5, v - 5, 11, 11);
+  }
+  line.textContent = line.dataset.command + clicks.map(([u, v]) => ` --click ${u},${v}`).join("");
+}
+image.onload = () => { canvas.width = image.width; canvas.height = image.height; draw(); };
+canvas.onclick = (event) => {
+  const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
+  if (clicks.length == 2) clicks = [];
+  const place = [event.clientX - box.left, event.clientY - box.top];
+  clicks.push(place.map((x) => Math.floor(x * scale)));
+  draw();
+};
+image.src = "data:image/png;base64,PIXELS";
+</script></body></html>
+"""
+"""A page in which a person clicks on the bands of an image."""
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -63,9 +92,9 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="FILE.html",
         help="only write a page of the image that makes the command from clicks",
     )
-    add_motor_options(colour)
-    add_rig_options(colour)
-    add_options(colour)
+    positions.add_motor_options(colour)
+    calibration_rig.add_options(colour)
+    calibration_output.add_options(colour)
 
 
 def _pixel(text: str) -> tuple[int, int]:
@@ -76,6 +105,8 @@ def _pixel(text: str) -> tuple[int, int]:
 
 
 def _run(options: argparse.Namespace) -> None:
+    from tautscope.calibration.bands.result import colour_result  # noqa: PLC0415
+
     files: list[Path] = options.files
     if options.page is not None:
         of_clicks = ("click", "motors", "video_start", "twin", "seed", "yes")
@@ -84,30 +115,30 @@ def _run(options: argparse.Namespace) -> None:
         _write_page(options, files)
         return
     record = files[0] if len(files) == 1 and not options.click else None
-    check_rig_options(options, is_motion=not files)
-    check_motor_options(options, record)
-    check_options(options, reads_config=record is not None or not files)
-    if options.click:
-        images = _clicked(files, options.click)
-    elif not files:
-        finish(options, calibrate(options))
-        return
-    elif record is not None:
-        from tautscope.calibration.bands.motion import ImageSequence  # noqa: PLC0415
-
-        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
-        images = read_motion(options, record, ImageSequence, allowed)[0].label()
-    else:
-        images = _masked(files)
-    finish(options, _result(images))
+    calibration_rig.check_options(options, is_motion=not files)
+    positions.check_motor_options(options, record)
+    reads_config = record is not None or not files
+    calibration_output.check_options(options, reads_config=reads_config)
+    is_labelled = bool(files or options.click)
+    found = colour_result(_labelled(options, record)) if is_labelled else calibrate(options)
+    calibration_output.finish(options, found)
 
 
 def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
-    from tautscope.commands.click_page import write_click_page  # noqa: PLC0415
+    """Write a self-contained page that makes the command with the clicks."""
+    import cv2  # noqa: PLC0415
+
+    from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) != 1:
         raise FieldError("files", len(files), "one image, with --page")
-    write_click_page(files[0], options.page)
+    image = read_image(files[0])
+    check_free_file(options.page)
+    _, data = cv2.imencode(".png", image)
+    command = shlex.join(["tautscope", "calibrate", "colour", str(files[0])])
+    text = _PAGE.replace("COMMAND", escape(command, quote=True))
+    text = text.replace("PIXELS", base64.b64encode(data.tobytes()).decode())
+    options.page.write_text(text, encoding="utf-8")
     print_json(options, {"file": str(options.page)})
     print(f"Open {options.page} in a browser, and click on the bands.")
 
@@ -115,33 +146,27 @@ def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
 def calibrate(options: argparse.Namespace) -> CalibrationResult:
     """Move the rig or the twin, and fit the colour of what moves with the motors."""
     from tautscope.calibration.bands.motion import record_motion  # noqa: PLC0415
+    from tautscope.calibration.bands.result import colour_result  # noqa: PLC0415
 
-    with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
+    with calibration_rig.open_rig(options) as setup, progress_bar("motion") as progress:
         found = record_motion(setup.rig, setup.config, progress)
-    return _result(found.label(), setup.serial_numbers)
+    return colour_result(found.label(), setup.serial_numbers)
 
 
-def _result(
-    images: Sequence[LabelledImage], serial_numbers: Mapping[str, str] | None = None
-) -> CalibrationResult:
-    from tautscope.calibration.bands.result import colour_result, fit_colour  # noqa: PLC0415
-
-    return colour_result(fit_colour(images), images, serial_numbers or {})
-
-
-def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.labels import label_clicks  # noqa: PLC0415
+def _labelled(options: argparse.Namespace, record: Path | None) -> list[LabelledImage]:
+    """The images of the clicks, of a record of a motion, or of the masks."""
+    from tautscope.calibration.bands.labels import from_mask, label_clicks  # noqa: PLC0415
+    from tautscope.calibration.bands.motion import ImageSequence  # noqa: PLC0415
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
-    if len(files) != 1:
-        raise FieldError("files", len(files), "one image, with --click")
-    return [label_clicks(read_image(files[0]), clicks)]
-
-
-def _masked(files: Sequence[Path]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.labels import from_mask  # noqa: PLC0415
-    from tautscope.calibration.images import read_image  # noqa: PLC0415
-
+    files: list[Path] = options.files
+    if options.click:
+        if len(files) != 1:
+            raise FieldError("files", len(files), "one image, with --click")
+        return [label_clicks(read_image(files[0]), options.click)]
+    if record is not None:
+        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
+        return positions.read_motion(options, record, ImageSequence, allowed)[0].label()
     if len(files) % 2:
         raise FieldError("files", len(files), "pairs of an image and its mask")
     images = []

@@ -9,19 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments
-from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import (
-    add_rig_options,
-    check_rig_options,
-    rig_for_calibration,
-)
+from tautscope.commands import arguments, calibration_output, calibration_rig, positions
 from tautscope.commands.printing import print_json, progress_bar
-from tautscope.commands.recorded_motion import (
-    add_motor_options,
-    check_motor_options,
-    read_motion,
-)
 from tautscope.config import Config
 from tautscope.errors import RecordError
 
@@ -51,7 +40,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="FILE",
         help="a log (.mcap), or a video with --motors",
     )
-    add_motor_options(geometry)
+    positions.add_motor_options(geometry)
     geometry.add_argument(
         "--intrinsics",
         choices=("none", "focal", "all"),
@@ -66,22 +55,22 @@ def add_parser(kinds: arguments.Verbs) -> None:
         help="measured distance of the bands' centres, as the scale of all lengths [the travel of "
         "the insertion drive]",
     )
-    add_rig_options(geometry)
-    add_options(geometry)
+    calibration_rig.add_options(geometry)
+    calibration_output.add_options(geometry)
 
 
 def _run(options: argparse.Namespace) -> int:
     from tautscope.calibration.geometry import Recorder, fit  # noqa: PLC0415
 
     file: Path | None = options.file
-    check_rig_options(options, is_motion=file is None)
-    check_motor_options(options, file)
-    check_options(options)
+    calibration_rig.check_options(options, is_motion=file is None)
+    positions.check_motor_options(options, file)
+    calibration_output.check_options(options)
     serial_numbers: Mapping[str, str] = {}
     if file is None:
-        recording, config, serial_numbers = move(options, camera_is_known=True)
+        recording, config, serial_numbers = move(options)
     else:
-        recorder, config = read_motion(options, file, Recorder)
+        recorder, config = positions.read_motion(options, file, Recorder)
         recording = recorder.recording()
     distance = None if options.band_distance is None else options.band_distance * 1e-3
     found = fit(recording, config, intrinsics=options.intrinsics, band_distance=distance)
@@ -92,7 +81,8 @@ def _run(options: argparse.Namespace) -> int:
             print(f"warning: {warning}.", file=sys.stderr)
         print("The model does not explain this record. Nothing was written.", file=sys.stderr)
         return 1
-    finish(options, result(found, serial_numbers, with_figures=options.out is not None))
+    found_result = result(found, serial_numbers, with_figures=options.out is not None)
+    calibration_output.finish(options, found_result)
     if options.out is not None and found.recording.patches:
         from tautscope.report.geometry_figures import write_overlay  # noqa: PLC0415
 
@@ -100,14 +90,12 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def move(
-    options: argparse.Namespace, *, camera_is_known: bool
-) -> tuple[Recording, Config, Mapping[str, str]]:
+def move(options: argparse.Namespace) -> tuple[Recording, Config, Mapping[str, str]]:
     """The record of a sweep of the rig or the twin, its configuration and its devices."""
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
 
     with (
-        rig_for_calibration(options, camera_is_known=camera_is_known) as setup,
+        calibration_rig.open_rig(options, camera_is_known=True) as setup,
         progress_bar("sweep") as progress,
     ):
         recording = sweep(setup.rig, setup.config, executor=setup.executor, progress=progress)

@@ -9,21 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments, robot, robot_calibration
+from tautscope.commands import arguments, calibration_output, calibration_rig, robot
 from tautscope.commands.align import NO_ANSWER, print_delay
-from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import (
-    ARTICLE_MOTION,
-    add_rig_options,
-    check_rig_options,
-    confirm_motion,
-    refuse_wrong_limits,
-    run_protocol,
-    twin_device,
-)
 from tautscope.commands.printing import print_json
 from tautscope.commands.rig_choice import add_rig
-from tautscope.commands.robot import DURATION
+from tautscope.commands.robot_calibration import run_latency
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CalibrationError, ConfigError, FieldError
@@ -68,9 +58,9 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a sweep of "
         "all degrees of freedom within 80 %% of their ranges",
     )
-    robot.add_seconds(latency, "a rig", DURATION / 2)
-    add_rig_options(latency)
-    add_options(latency)
+    robot.add_seconds(latency, "a rig", robot.DURATION / 2)
+    calibration_rig.add_options(latency)
+    calibration_output.add_options(latency)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -79,22 +69,23 @@ def _run(options: argparse.Namespace) -> int:
     file: Path | None = options.file
     if options.rig is not None and (file is not None or options.twin):
         raise FieldError("--rig", options.rig, "neither a file nor --twin")
-    check_rig_options(options, is_motion=file is None)
-    check_options(options, reads_config=file is None)
+    calibration_rig.check_options(options, is_motion=file is None)
+    calibration_output.check_options(options, reads_config=file is None)
     if file is not None or options.rig is not None or options.twin:
         arguments.refuse_unused(options, "a motion of [drives], whose log it is", "log")
     if options.rig is None:
         arguments.refuse_unused(options, "--rig, whose motion it is", "seconds")
     else:
         require_extras("--rig", ["analysis"])
-        return robot_calibration.run_latency(options)
+        run_latency(options)
+        return 0
     recording, serial_numbers = _recording(options)
     found = align_recording(recording)
     print_delay(found)
     if not found.is_known:
         print_json(options, {**found.to_json(), "camera_delay": None})
         return NO_ANSWER
-    finish(options, result(found, recording.config, serial_numbers))
+    calibration_output.finish(options, result(found, recording.config, serial_numbers))
     return 0
 
 
@@ -105,9 +96,6 @@ def result(
 
     The calibration of the geometry has estimated it too. The value with the smaller standard
     deviation is kept; if both disagree, there is no answer.
-
-    Raises:
-        CalibrationError: There is no answer, or the images are stamped before they are captured.
     """
     if not found.is_known:
         remedy = "Give camera.source.delay yourself, or leave out this step: docs/recordings.md"
@@ -151,8 +139,8 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"
             raise ConfigError("drives", None, allowed)
-        refuse_wrong_limits(options.config)
-        confirm_motion(options, ARTICLE_MOTION, config)
+        calibration_rig.refuse_wrong_limits(options.config)
+        calibration_rig.confirm_motion(options, calibration_rig.ARTICLE_MOTION, config)
     return record(options, config, check_free(options.log or default_folder("latency")))
 
 
@@ -170,10 +158,11 @@ def record(
         changes[f"experiment.{dof.label}.amplitude"] = SHARE * sine.amplitude
         changes[f"experiment.{dof.label}.period"] = SHARE * sine.period
     if options.twin:
-        serial_numbers = twin_device(options, config)
+        serial_numbers = calibration_rig.twin_device(options, config)
     else:
         from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
 
         serial_numbers = read_serial_numbers(config)
-    recording, _ = run_protocol(options, config.replace(**changes), folder, "motion")
+    config = config.replace(**changes)
+    recording, _ = calibration_rig.run_protocol(options, config, folder, "motion")
     return recording, serial_numbers

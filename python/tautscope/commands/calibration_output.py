@@ -32,13 +32,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def check_options(options: argparse.Namespace, *, reads_config: bool = True) -> None:
     """Check before anything runs that the results can be written.
 
-    Args:
-        options: With those of `add_options`.
-        reads_config: Whether ``--config`` is more than the file of ``--write``.
-
-    Raises:
-        FieldError: ``--write`` without ``--config``, or ``--config`` without an effect.
-        OutputError: The folder is taken or cannot be written.
+    `reads_config`: whether ``--config`` is more than the file of ``--write``.
     """
     if options.write:
         if options.config is None:

@@ -6,14 +6,13 @@ import argparse
 import re
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import progress_bar
-from tautscope.commands.question import confirm
+from tautscope.commands.printing import confirm, progress_bar
 from tautscope.config import Config
 from tautscope.config.calibration import TWIN
 from tautscope.config.placeholders import MARK, placeholders
@@ -46,7 +45,7 @@ class Setup:
     executor: Executor | None = None
 
 
-def add_rig_options(parser: argparse.ArgumentParser) -> None:
+def add_options(parser: argparse.ArgumentParser) -> None:
     """``--twin``, ``--seed``, ``--yes``."""
     add_twin(parser, "calibrate a simulated rig that differs from --config, see --seed")
     add_yes(parser)
@@ -68,15 +67,10 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="move the motors without asking")
 
 
-def check_rig_options(options: argparse.Namespace, *, is_motion: bool = True) -> None:
+def check_options(options: argparse.Namespace, *, is_motion: bool = True) -> None:
     """Check ``--twin`` and ``--seed``; ``--yes`` may answer a question that is not asked.
 
-    Args:
-        options: Of a calibration.
-        is_motion: Whether the rig or the twin is calibrated, and no file.
-
-    Raises:
-        FieldError: One of them has no effect.
+    Without `is_motion` no rig is calibrated, but a file.
     """
     if not is_motion:
         arguments.refuse_unused(options, "no files beside it", "twin", "seed")
@@ -97,12 +91,9 @@ def twin_device(options: argparse.Namespace, config: Config) -> dict[str, str]:
 def twin_config(
     options: argparse.Namespace, config: Config, *, camera_is_known: bool = False
 ) -> Config:
-    """The configuration of the simulated rig that is calibrated.
+    """The configuration of the simulated rig that is calibrated; `camera_is_known`: `open_rig`.
 
-    Args:
-        options: Of a calibration; with the values `drawn` once at the start of a sequence.
-        config: The configuration as it is now.
-        camera_is_known: As of `rig_for_calibration`.
+    In a sequence the options have the values `drawn` at its start.
     """
     from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
 
@@ -114,30 +105,19 @@ def twin_config(
 
 
 @contextmanager
-def rig_for_calibration(
-    options: argparse.Namespace, *, camera_is_known: bool = False
-) -> Iterator[Setup]:
-    """Open the rig of the options, and close it at the end.
+def open_rig(options: argparse.Namespace, *, camera_is_known: bool = False) -> Iterator[Setup]:
+    """Open the rig of the options, once its motors may move, and close it at the end.
 
-    Args:
-        options: With those of `add_rig_options`.
-        camera_is_known: Whether the twin's camera is calibrated, apart from its focal lengths.
-
-    Raises:
-        FieldError: Neither ``--config`` with drives nor ``--twin`` is given, or the question
-            whether the motors may move is not answered with y.
-        TautscopeError: Errors of the rig.
+    With `camera_is_known` the twin's camera is calibrated, apart from its focal lengths.
     """
     config = arguments.article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
         from tautscope.twin.rig import Twin  # noqa: PLC0415
 
-        twin = Twin(twin_config(options, config, camera_is_known=camera_is_known))
-        try:
+        drawn = twin_config(options, config, camera_is_known=camera_is_known)
+        with closing(Twin(drawn)) as twin:
             yield Setup(twin, config, twin_device(options, config))
-        finally:
-            twin.close()
         return
     if options.config is None:
         raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
@@ -152,11 +132,8 @@ def rig_for_calibration(
     # On every exit the motors are quick-stopped.
     with realtime_executor("vision", VISION) as executor, exit_on_signals():
         serial_numbers = read_serial_numbers(config)
-        rig = HardwareRig(config)
-        try:
+        with closing(HardwareRig(config)) as rig:
             yield Setup(rig, config, serial_numbers, executor)
-        finally:
-            rig.close()
 
 
 def run_protocol(
@@ -169,7 +146,7 @@ def run_protocol(
 
             run = run_on_hardware(config, folder, progress)
             return run.compensated.recording, run
-        with rig_for_calibration(options) as setup:
+        with open_rig(options) as setup:
             motion = SineSequence(config.experiment)
             recording = run_experiment(
                 setup.rig, motion, config, progress=lambda now, end: progress(now / end)
@@ -178,11 +155,7 @@ def run_protocol(
 
 
 def refuse_wrong_limits(config: str | None) -> None:
-    """Refuse a configuration in which values of the drives or of [[dof]] are placeholders.
-
-    Raises:
-        ConfigError: Names the keys.
-    """
+    """Refuse a configuration in which values of the drives or of [[dof]] are placeholders."""
     marked = [key for key in placeholders(config) if re.match(r"(drives|dof)\b", key)]
     if marked:
         allowed = f"your values, and lines without the word {MARK}: the motors would move wrongly"
@@ -190,10 +163,6 @@ def refuse_wrong_limits(config: str | None) -> None:
 
 
 def confirm_motion(options: argparse.Namespace, what: str, config: Config) -> None:
-    """Ask whether the motors may move, unless ``--yes``.
-
-    Raises:
-        FieldError: The answer is not y.
-    """
+    """Ask whether the motors may move, unless ``--yes``."""
     text = f"{what} tissue and hands away, the emergency stop within reach."
     confirm(f"THE MOTORS WILL MOVE, {text}", options, config.camera)

@@ -21,11 +21,8 @@ class SessionState(msgspec.Struct, forbid_unknown_fields=True):
     """The state file beside the configuration.
 
     Attributes:
-        folder: Folder of the report.
-        seed: Seed of the twin, None on a rig.
         drawn: Values of the twin, drawn about the configuration before the first step.
         done: Names of the steps done or skipped.
-        is_finished: Whether all were done.
     """
 
     folder: str
@@ -38,18 +35,8 @@ class SessionState(msgspec.Struct, forbid_unknown_fields=True):
 class CalibrationSession:
     """A sequence of calibrations of one configuration file, begun or resumed.
 
-    Args:
-        file: The configuration.
-        folder: Folder of the report of a new session.
-        seed: Seed of the twin, None on a rig.
-        restart: Whether an unfinished session is dropped.
-
-    Attributes:
-        state: What is done.
-
-    Raises:
-        MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or the
-            session to be resumed is of another rig.
+    A new one has its report in `folder`; `restart` drops one that is unfinished. On a rig the seed,
+    that of the twin, is None.
     """
 
     def __init__(self, file: Path, folder: Path, seed: int | None, *, restart: bool) -> None:
@@ -57,7 +44,12 @@ class CalibrationSession:
         self._state_file = writable_file(file).with_suffix(".calibration.json")
         state = None if restart else _read(self._state_file)
         if state is None or state.is_finished:
-            state = SessionState(str(folder.absolute()), seed, self._drawn(seed))
+            drawn = None
+            if seed is not None:
+                from tautscope.twin.drawn_rig import draw_values  # noqa: PLC0415  MuJoCo
+
+                drawn = draw_values(self.config, seed)
+            state = SessionState(str(folder.absolute()), seed, drawn)
         if state.seed != seed:
             names = [
                 "the rig" if one is None else f"--twin --seed {one}" for one in (state.seed, seed)
@@ -70,13 +62,6 @@ class CalibrationSession:
     def config(self) -> Config:
         """The configuration as it is now."""
         return article_config(self._file)
-
-    def _drawn(self, seed: int | None) -> dict[str, Any] | None:
-        if seed is None:
-            return None
-        from tautscope.twin.drawn_rig import draw_values  # noqa: PLC0415
-
-        return draw_values(self.config, seed)
 
     def finish_step(self, name: str, result: CalibrationResult | None) -> None:
         """Write values, figures and notes of a step, None if it was skipped; note it as done."""

@@ -29,14 +29,10 @@ MOTION = "motion"
 
 @dataclass(frozen=True)
 class Step:
-    """One step.
+    """One step, what the user has to prepare, and what it does.
 
-    Attributes:
-        name: ``camera``, ``colour``, ...
-        title: For the report.
-        todo: What the user has to prepare.
-        run: Takes the options of the command, the configuration as it is then, and a folder for
-            its own files; the result has no values if it only checks.
+    That takes the options of the command, the configuration as it is then, and a folder for its own
+    files; the result has no values if it only checks.
     """
 
     name: str
@@ -57,13 +53,12 @@ def _colour(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.calibration.geometry import fit  # noqa: PLC0415
+    from tautscope.calibration.geometry import Intrinsics, fit  # noqa: PLC0415
 
-    recording, _, serial_numbers = calibrate_geometry.move(options, camera_is_known=False)
+    recording, _, serial_numbers = calibrate_geometry.move(options)
     # A board determines the intrinsics better than the instrument.
-    found = fit(
-        recording, config, intrinsics="focal" if config.calibration.camera is None else "none"
-    )
+    intrinsics: Intrinsics = "focal" if config.calibration.camera is None else "none"
+    found = fit(recording, config, intrinsics=intrinsics)
     result = calibrate_geometry.result(found, serial_numbers)
     return replace(result, notes=(f"residual {found.residual_px:.2g} px", *result.notes))
 
@@ -71,9 +66,8 @@ def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> Cali
 def _latency(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
     from tautscope.log.alignment import align_recording  # noqa: PLC0415
 
-    recording, serial_numbers = calibrate_latency.record(
-        options, config, _unused(folder, "latency")
-    )
+    place = _unused(folder, "latency")
+    recording, serial_numbers = calibrate_latency.record(options, config, place)
     return calibrate_latency.result(align_recording(recording), config, serial_numbers)
 
 
@@ -81,7 +75,7 @@ def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
     if options.twin:
         findings = check_calibration(config.calibration, {}, options.config)
     else:
-        findings = list(run_checks(config, options.config, Path.cwd()))
+        findings = list(run_checks(config, options.config))
     lines = [f"{each.status}: {each.what}: {each.found}" for each in findings]
     missing = [each for each in findings if each.status == "missing"]
     if missing:

@@ -1,11 +1,8 @@
 """``tautscope demo``."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, robot
 from tautscope.commands.printing import announce, print_json, progress_bar
@@ -14,9 +11,6 @@ from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import MissingPathError
 from tautscope.loop.references import SineSequence
 from tautscope.runs.output_folder import recording_saved
-
-if TYPE_CHECKING:
-    from tautscope.report.demo import Demo
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
@@ -100,7 +94,15 @@ def _run(options: argparse.Namespace) -> None:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     print_json(options, {"folder": str(folder), **found.to_json()})
-    _print_summary(found, folder)
+    dofs = ", ".join(dof.label for dof in found.results[0])
+    several = f", medians of {len(seeds)} seeds" if len(seeds) > 1 else ""
+    lines = [
+        f"{found.sim_seconds:.0f} s simulated in {found.wall_seconds:.0f} s ({dofs}{several}).",
+        *found.verdict,
+        f"Without and with compensation: {folder / 'film.gif'}",
+        f"Tables, figures, {len(found.warnings)} warnings of the loop: {folder / 'report.html'}",
+    ]
+    print("\n".join(lines))
 
 
 def _run_robot(options: argparse.Namespace) -> None:
@@ -113,27 +115,11 @@ def _run_robot(options: argparse.Namespace) -> None:
 
 def _load(options: argparse.Namespace) -> Config:
     config = arguments.article_config(options.config, options.profile)
-    changes: dict[str, Any] = {}
-    if options.seed is not None:
-        changes["twin.seed"] = options.seed
-    if options.background is not None:
-        changes["twin.background"] = options.background
+    given = {"seed": options.seed, "background": options.background}
     if options.disturb is not None:
-        changes["twin.disturb"] = [name.strip() for name in options.disturb.split(",")]
-    config = config.replace(**changes)
+        given["disturb"] = [name.strip() for name in options.disturb.split(",")]
+    config = config.replace(**{f"twin.{k}": v for k, v in given.items() if v is not None})
     background = config.twin.background
     if background is not None and not Path(background).is_dir():
         raise MissingPathError("twin.background", background, "a folder of images")
     return config
-
-
-def _print_summary(demo: Demo, folder: Path) -> None:
-    dofs = ", ".join(dof.label for dof in demo.results[0])
-    several = f", medians of {len(demo.seeds)} seeds" if len(demo.seeds) > 1 else ""
-    lines = [
-        f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s ({dofs}{several}).",
-        *demo.verdict,
-        f"Without and with compensation: {folder / 'film.gif'}",
-        f"Tables, figures, {len(demo.warnings)} warnings of the loop: {folder / 'report.html'}",
-    ]
-    print("\n".join(lines))

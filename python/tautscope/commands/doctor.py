@@ -3,12 +3,12 @@
 import argparse
 import itertools
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_json
-from tautscope.commands.question import ask
+from tautscope.commands.printing import ask, print_json
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
@@ -47,19 +47,13 @@ def add_parser(verbs: arguments.Verbs) -> None:
     arguments.add_json(doctor)
 
 
-def run_checks(config: Config, file: str | None, folder: Path) -> Iterator[CheckResult]:
-    """Run all checks.
-
-    Args:
-        config: Configuration of the rig, or the default.
-        file: Its file; its camera and drives are opened. None for the default.
-        folder: Folder for recordings.
-    """
+def run_checks(config: Config, file: str | None) -> Iterator[CheckResult]:
+    """Run all checks; without the `file` of a rig, no camera and no drive is opened."""
     from tautscope.hardware.doctor import camera, computer, drives  # noqa: PLC0415
 
     is_rig = file is not None
     yield from computer.check_computer(config)
-    yield computer.check_disk(config, folder)
+    yield computer.check_disk(config, Path.cwd())
     yield camera.check_devices(needed=not is_rig)
     yield drives.check_interfaces(needed=not is_rig)
     if missing_modules("hardware"):
@@ -96,11 +90,7 @@ def run_checks(config: Config, file: str | None, folder: Path) -> Iterator[Check
 def _check_own(
     options: argparse.Namespace, config: Config, make: Callable[[Config], Rig]
 ) -> Iterator[CheckResult]:
-    """Check the drives, open the rig of ``--rig``, and check it if it may be reset.
-
-    Raises:
-        ConfigError: There is no such rig, or the configuration has no [[dof]].
-    """
+    """Check the drives, open the rig of ``--rig``, and check it if it may be reset."""
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
     if config.drives is not None:
@@ -112,8 +102,7 @@ def _check_own(
             return
     kinds = [kind for kind in ("robot", "latency") if getattr(config.calibration, kind) is not None]
     yield from check_calibration(config.calibration, {}, options.config, kinds=kinds)
-    rig = make(config)
-    try:
+    with closing(make(config)) as rig:
         period = f"control_period {1e3 * config.control.period:g} ms, as control.period"
         yield CheckResult("rig", options.rig, "ok", period)
         if options.yes or ask(QUESTION, config.camera).strip() in ("y", "yes"):
@@ -121,14 +110,12 @@ def _check_own(
         else:
             todo = "Answer y, or give --yes"
             yield CheckResult("rig", "samples", "note", "not checked: nothing moved", todo)
-    finally:
-        rig.close()
 
 
 def _doctor(options: argparse.Namespace) -> int:
     if options.rig is None:
         config = arguments.article_config(options.config)
-        checks = run_checks(config, options.config, Path.cwd())
+        checks = run_checks(config, options.config)
     else:
         checks = _check_own(options, *choose_rig(options))
     marked = placeholders(options.config)

@@ -1,7 +1,10 @@
-"""The command ``tautscope run``."""
+"""The command ``tautscope run``: the article's experiment, or that of the desktop rig."""
 
 import argparse
+import datetime
+import json
 import sys
+from pathlib import Path
 
 from tautscope.commands import arguments, robot
 from tautscope.commands.calibration_rig import add_yes, confirm_motion
@@ -9,12 +12,30 @@ from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.result_lines import print_results
 from tautscope.commands.rig_choice import add_rig, choose_rig
-from tautscope.commands.run_protocol import add_protocol, apply_protocol, write_environment
+from tautscope.config import Config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError, may_move, notes
-from tautscope.hardware.doctor.computer import bytes_per_second
+from tautscope.hardware.doctor.computer import bytes_per_second, check_computer
+from tautscope.log.header import software_versions
 from tautscope.loop.references import SineSequence
 from tautscope.runs.output_folder import recording_saved
+
+BENDS = (0, 90, 180, 360)
+"""Bends of the desktop rig's channel [degrees]."""
+DESKTOP_PERIODS = 3
+"""Periods per DOF of protocol ``desktop``: the fewest that the experiment may have."""
+_ABOUT = """A record of the desktop rig of tautscope, made by `tautscope run --protocol desktop`.
+
+report.html             tables and figures; open it in a browser
+compensated.mcap        log of the run with compensation: images, references, motors, estimates
+uncompensated.mcap      log of the same motion without it, which was recorded first
+config.toml             the configuration, every key
+environment.json        bend of the channel, software, computer
+*.csv                   tables of both runs; recording*.toml describe them
+
+Before you share this folder look through environment.json and run.json: they name your computer's
+system and folders. docs/records.md of tautscope says where records go, and under which licence.
+"""
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -45,7 +66,19 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="N",
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
-    add_protocol(run)
+    run.add_argument(
+        "--protocol",
+        choices=("article", "desktop"),
+        default="article",
+        help="desktop: three periods per DOF without, then with compensation, and a folder to "
+        "share, see docs/records.md [%(default)s]",
+    )
+    run.add_argument(
+        "--bend",
+        type=int,
+        choices=BENDS,
+        help="of --protocol desktop: bend of the channel [degrees]",
+    )
     add_reference(run, "the article's experiment")
     add_rig(
         run,
@@ -62,7 +95,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
-    apply_protocol(options)
+    _apply_protocol(options)
     if options.rig is not None:
         if options.reference is not None or options.periods is not None or options.compare:
             what = "neither --reference nor --periods nor --compare"
@@ -94,7 +127,7 @@ def _run(options: argparse.Namespace) -> int:
         return 130
     write_run_folder(found, folder)
     if options.protocol == "desktop":
-        write_environment(options, config, folder)
+        _write_environment(options, config, folder)
     print_json(options, {"folder": str(folder), **found.to_json()})
     timing = found.compensated.timing.summary()
     print(
@@ -104,3 +137,34 @@ def _run(options: argparse.Namespace) -> int:
     )
     print_results(found.recorded, folder)
     return 0
+
+
+def _apply_protocol(options: argparse.Namespace) -> None:
+    """Set what the protocol determines: both runs, and three periods."""
+    if options.protocol != "desktop":
+        if options.bend is not None:
+            raise FieldError("--bend", options.bend, "--protocol desktop, of whose rig it is")
+        return
+    for name in ("reference", "rig"):
+        if getattr(options, name) is not None:
+            allowed = f"no --{name}, which is another motion or rig"
+            raise FieldError("--protocol", "desktop", allowed)
+    if options.bend is None:
+        allowed = f"--bend with the bend of the channel in degrees: {', '.join(map(str, BENDS))}"
+        raise FieldError("--protocol", "desktop", allowed)
+    options.compare = True
+    options.periods = options.periods or DESKTOP_PERIODS
+
+
+def _write_environment(options: argparse.Namespace, config: Config, folder: Path) -> None:
+    """Write what a shared record needs beside log and report."""
+    facts = {
+        "protocol": options.protocol,
+        "bend": options.bend,
+        "recorded": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "software": software_versions(),
+        "computer": {check.what: check.found for check in check_computer(config)},
+    }
+    text = json.dumps(facts, indent=1) + "\n"
+    (folder / "environment.json").write_text(text, encoding="utf-8")
+    (folder / "README.txt").write_text(_ABOUT, encoding="utf-8")

@@ -1,21 +1,15 @@
 """The command ``tautscope jog``."""
 
-from __future__ import annotations
-
 import argparse
+from contextlib import closing
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import refuse_wrong_limits
-from tautscope.commands.printing import print_json
-from tautscope.commands.question import confirm
+from tautscope.commands.printing import confirm, print_json
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError, FieldError
-
-if TYPE_CHECKING:
-    from tautscope.hardware.jog import SensorMotion
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -74,17 +68,13 @@ def _jog(options: argparse.Namespace) -> None:
     before = "Faults of all drives are reset. " if options.reset_faults else before
     question = f"{before}{dof.label} will move by {display_text([distance], [dof])} and back."
     confirm(question, options, config.camera)
-    seen: list[SensorMotion] = []
     if options.rig is not None:
-        rig = make_rig(config)
-        try:
+        with closing(make_rig(config)) as rig:
             largest, end, seen = jog_rig(rig, config, index, distance)
-        finally:
-            rig.close()
     else:
         assert config.drives is not None
-        drives, motor, reset = config.drives, Dof(index), options.reset_faults
-        largest, end = jog(drives, motor, distance, reset_faults=reset)
+        largest, end = jog(config.drives, Dof(index), distance, reset_faults=options.reset_faults)
+        seen = []
     found = {"dof": dof.label, "moved": largest, "ended_at": end}
     sensors = {"sensors": [asdict(each) for each in seen]} if options.rig else {}
     print_json(options, found | sensors)

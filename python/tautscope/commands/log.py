@@ -8,13 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands import arguments
-from tautscope.commands.positions import (
-    add_video_options,
-    align_video_options,
-    check_video_options,
-    read_positions,
-)
+from tautscope.commands import arguments, positions
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
@@ -85,7 +79,7 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         "offsets only. The delay of the video is estimated from the record.",
         extras=["hardware"],
     )
-    add_video_options(
+    positions.add_video_options(
         replay, "time of the video's first frame in the motors' [s] [estimated, see `align`]"
     )
     arguments.add_config(replay)
@@ -156,7 +150,7 @@ def _print_damage(options: argparse.Namespace, document: dict[str, Any], damage:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    check_video_options(options)
+    positions.check_video_options(options)
     if options.video is not None:
         return _estimate_from_video(options)
     from tautscope.log.reader import read_log  # noqa: PLC0415
@@ -216,8 +210,8 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
 
     config: Config = arguments.article_config(options.config, options.profile)
     folder = arguments.out_folder(options)
-    motors = read_positions(options.motors, options.units, config)
-    found, stamps = align_video_options(options, config, motors)
+    motors = positions.read_positions(options.motors, options.units, config)
+    found, stamps = positions.align_video_options(options, config, motors)
     for note in implausible_motors(found):
         _LOG.warning("%s", note)
     start = float(stamps[0]) - (found.delay if found.is_known else 0.0)

@@ -1,10 +1,11 @@
-"""Options that read positions of the three DOFs, the units of their columns, and a video."""
+"""Options that read positions of the three DOFs, with a video or from a log."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,10 @@ from tautscope.runs.units import parse_units
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
+    from tautscope.calibration.motion import ImageRecorder
 
 Floats = NDArray[np.float64]
+Recorder = TypeVar("Recorder", bound="ImageRecorder")
 
 LARGEST_WORKSPACES = 3.0
 """Positions beyond so many workspaces of the experiment are in another unit."""
@@ -58,12 +61,7 @@ def read_positions(path: str, units: str, config: Config) -> tuple[Floats, Float
 
 
 def read_reference(options: argparse.Namespace, config: Config) -> RecordedReference | None:
-    """The motion of ``--reference``; None without the option.
-
-    Raises:
-        FieldError: ``--units`` without ``--reference``.
-        RecordError: The file cannot be used, or a position is outside the drives' travel.
-    """
+    """The motion of ``--reference``, within the drives' travel; None without the option."""
     if options.reference is None:
         if options.units:
             raise FieldError(
@@ -99,11 +97,7 @@ def add_video_options(parser: argparse.ArgumentParser, start_help: str) -> None:
 
 
 def check_video_options(options: argparse.Namespace) -> None:
-    """Check that there is either a log or a video with motor positions.
-
-    Raises:
-        FieldError: There is not, or an option of videos is given with a log.
-    """
+    """Check that there is either a log or a video with motor positions."""
     if (options.file is None) == (options.video is None):
         given = None if options.file is None else "a log and --video"
         raise FieldError(options.verb, given, "a log, or --video with --motors")
@@ -118,12 +112,9 @@ def check_video_options(options: argparse.Namespace) -> None:
 def align_video_options(
     options: argparse.Namespace, config: Config, motors: tuple[Floats, Floats], limit: float = 5.0
 ) -> tuple[DelayEstimate, Floats]:
-    """Delay of the frames of ``--video``.
+    """Delay of the frames of ``--video``, and their stamps (m,) [s].
 
-    Their stamps begin with ``--video-start``, or with the first time of the motors.
-
-    Returns:
-        The estimate, and the stamps of the frames (m,) [s].
+    These begin with ``--video-start``, or with the first time of the motors.
     """
     from tautscope.log.alignment import align_video  # noqa: PLC0415
 
@@ -131,3 +122,66 @@ def align_video_options(
     frames = read_video(options.video, config.camera, start)
     with progress_bar("delay of the video") as progress:
         return align_video(frames, *motors, config, limit=limit, progress=progress)
+
+
+def add_motor_options(parser: argparse.ArgumentParser) -> None:
+    """``--motors`` and ``--video-start``."""
+    parser.add_argument(
+        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
+    )
+    parser.add_argument(
+        "--video-start",
+        type=arguments.seconds,
+        default=0.0,
+        metavar="S",
+        help="time of the video's first frame in the CSV's [s] [%(default)s]",
+    )
+
+
+def check_motor_options(options: argparse.Namespace, file: Path | None) -> None:
+    """Check that ``--motors`` and ``--video-start`` belong to a video; `file` may be a log."""
+    if file is None or file.suffix == ".mcap":
+        arguments.refuse_unused(options, "a video together with --motors", "motors")
+    if options.motors is None:
+        arguments.refuse_unused(options, "a video with --motors", "video_start")
+
+
+def read_motion(
+    options: argparse.Namespace,
+    file: Path,
+    make: Callable[[Config], Recorder],
+    allowed: str = "a log (.mcap), or a video with --motors",
+) -> tuple[Recorder, Config]:
+    """Read a log, or a video with ``--motors``, into a recorder; `allowed` is for the error."""
+    if file.suffix == ".mcap":
+        return _read_log(options, file, make)
+    if options.motors is None:
+        raise FieldError("file", str(file), allowed)
+    config = arguments.article_config(options.config)
+    recorder = make(config)
+    times, positions = read_motors(options.motors)
+    for time, position in zip(times, positions, strict=True):
+        recorder.add_tick(float(time), position)
+    for frame in read_video(str(file), config.camera, options.video_start):
+        if times[0] <= frame.captured_at <= times[-1] and recorder.is_due(frame.captured_at):
+            recorder.add_image(frame.image, frame.captured_at)
+    return recorder, config
+
+
+def _read_log(
+    options: argparse.Namespace, file: Path, make: Callable[[Config], Recorder]
+) -> tuple[Recorder, Config]:
+    from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
+
+    log = read_log(file)
+    config = log.config if options.config is None else arguments.article_config(options.config)
+    config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
+    recorder = make(config)
+    for index, event in log.events.items():
+        if isinstance(event, Tick):
+            recorder.add_tick(event.sample.time, event.sample.applied)
+        elif isinstance(event, Update) and log.has_image(index):
+            captured_at = float(event.row["captured_at"])
+            if recorder.is_due(captured_at):
+                recorder.add_image(log.image(index), captured_at)
+    return recorder, config

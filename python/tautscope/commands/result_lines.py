@@ -9,26 +9,16 @@ from tautscope.report.recorded_run import RecordedRun
 from tautscope.report.results import DofResult
 
 
-def result_lines(run: RecordedRun) -> list[str]:
-    """A line of results per DOF."""
-    if not run.main.compensated:
-        shown = {
-            dof: f"slack {_shown(dof, result.uncompensated_estimate)}, by camera"
-            for dof, result in run.results.items()
-        } | {
-            dof: f"tracking error {_shown(dof, tracking.uncompensated_rms)} RMS, {run.tip}"
-            for dof, tracking in run.operator_results.items()
-        }
-        return [f"{dof.label}: without compensation {text}" for dof, text in shown.items()]
-    return [summary_line(dof, result) for dof, result in run.results.items()] + [
-        tracking_line(dof, tracking, run.tip) for dof, tracking in run.operator_results.items()
-    ]
-
-
 def print_results(run: RecordedRun, folder: Path) -> None:
     """Print a line of results per DOF, the warnings, and where the report is."""
-    for line in result_lines(run):
-        print(line)
+    for dof, result in run.results.items():
+        slack = _shown(dof, result.uncompensated_estimate)
+        plain = f"{dof.label}: without compensation slack {slack}, by camera"
+        print(summary_line(dof, result) if run.main.compensated else plain)
+    for dof, tracking in run.operator_results.items():
+        error = _shown(dof, tracking.uncompensated_rms)
+        plain = f"{dof.label}: without compensation tracking error {error} RMS, {run.tip}"
+        print(_tracking_line(dof, tracking, run.tip) if run.main.compensated else plain)
     for warning in run.main.warnings:
         print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
@@ -44,7 +34,7 @@ def summary_line(dof: NamedDof, result: DofResult) -> str:
     return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
 
 
-def tracking_line(dof: NamedDof, result: OperatorResult, tip: str) -> str:
+def _tracking_line(dof: NamedDof, result: OperatorResult, tip: str) -> str:
     """One line of the tracking of a recorded motion; a dash for unknown values."""
     line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
     if not math.isnan(result.reduction):

@@ -34,14 +34,8 @@ def choose_rig(
     That of ``--rig``; with ``--robot`` a simulated robot; with ``--twin`` the article's instrument,
     simulated in real time; else the drives and the camera of the configuration.
 
-    Args:
-        options: Of the command line.
-        in_real_time: Whether the steps of ``--rig`` and ``--robot`` take a control period, and each
-            reset makes the rig anew; drives do so by themselves.
-
-    Raises:
-        ConfigError: The configuration does not describe such a rig.
-        FieldError: ``--robot`` without ``--twin``, of a command that has it.
+    With `in_real_time` the steps of ``--rig`` and ``--robot`` take a control period, and each reset
+    makes the rig anew; drives do so by themselves.
     """
     names = ("rig", "robot", "twin", "profile", "seed")
     rig, robot, is_twin, profile, seed = (getattr(options, name, None) for name in names)

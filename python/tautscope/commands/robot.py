@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Callable
+from contextlib import closing
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import confirm_motion
@@ -67,13 +68,12 @@ def run(
             progress((len(runs) + min(now / end, 1.0)) / 2)
 
         for suffix, compensate in (("_uncompensated", False), ("", True)):
-            rig = make_rig(config)
             path = folder / f"{suffix[1:] or 'compensated'}.mcap"
-            try:
-                with run_log(path, config, compensate=compensate, wait=True) as log:
-                    runs.append(run_experiment(rig, motion, config, compensate, report, log=log))
-            finally:
-                rig.close()
+            with (
+                closing(make_rig(config)) as rig,
+                run_log(path, config, compensate=compensate, wait=True) as log,
+            ):
+                runs.append(run_experiment(rig, motion, config, compensate, report, log=log))
             runs[-1].write(folder, suffix)
     found = RecordedRun(runs[1], runs[0])
     found.write_report(folder, {"rig": name})

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import arguments
-from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands import arguments, calibration_output
 from tautscope.commands.calibration_rig import add_yes, confirm_motion, refuse_wrong_limits
 from tautscope.commands.printing import progress_bar
 from tautscope.commands.rig_choice import add_rig, choose_rig
@@ -48,11 +48,11 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_seconds(robot, "the sweep", DURATION / 2)
     add_yes(robot)
-    add_options(robot)
+    calibration_output.add_options(robot)
 
 
-def _run(options: argparse.Namespace) -> int:
-    check_options(options)
+def _run(options: argparse.Namespace) -> None:
+    calibration_output.check_options(options)
     config, found = _sweep(options, options.keep)
     if found.undetermined:
         keep = " ".join(f"--keep {name}" for name in found.undetermined if "gain" not in name)
@@ -60,19 +60,17 @@ def _run(options: argparse.Namespace) -> int:
             "The sweep does not determine " + ", ".join(found.undetermined),
             f"{_REMEDY}, or keep what is configured: {keep}" if keep else _REMEDY,
         )
-    finish(options, result("robot", found, config))
-    return 0
+    calibration_output.finish(options, result("robot", found, config))
 
 
-def run_latency(options: argparse.Namespace) -> int:
+def run_latency(options: argparse.Namespace) -> None:
     """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
     lost = [name for name in found.undetermined if name.startswith("measurement.delays")]
     if lost:
         what = "The sweep does not determine " + ", ".join(lost)
         raise CalibrationError(what, _REMEDY)
-    finish(options, result("latency", found, config))
-    return 0
+    calibration_output.finish(options, result("latency", found, config))
 
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
@@ -84,21 +82,16 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
     refuse_wrong_limits(options.config)
     sweep = sweep_motion(config, options.seconds or DURATION / 2)
     confirm_motion(options, "over 80 % of each range. Keep", config)
-    rig = make(config)
-    try:
-        with progress_bar("sweep") as progress:
-            record = move(rig, sweep, config, progress)
-    finally:
-        rig.close()
+    with closing(make(config)) as rig, progress_bar("sweep") as progress:
+        record = move(rig, sweep, config, progress)
     return config, fit(record, config, keep)
 
 
 def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
     """The fit in the form that all calibrations have; of ``latency`` the delays alone."""
-    from tautscope.calibration.robot.motor_map import motor_map  # noqa: PLC0415
-    from tautscope.calibration.robot.parameters import with_values  # noqa: PLC0415
+    from tautscope.calibration.robot.parameters import motor_map, with_values  # noqa: PLC0415
 
-    motors, motor_std = motor_map(config, found)
+    motors, motor_std = motor_map(config, found.values, found.std)
     values = {**with_values(config, found.values), **found.deviations, **motors}
     if kind == "latency":
         values = {"measurement.delays": values["measurement.delays"]}
@@ -120,17 +113,14 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
             )
     is_written = "actuators.matrix" in values
     written = "in actuators.matrix and offsets" if is_written else "not written"
-    units = {dof.name: dof.unit for dof in config.dof}
-    for name, unit in units.items():
-        zero, gain, slack = (f"dof.{name}.{key}" for key in ("zero", "gain", "slack"))
-        at = (
-            f", zero {found.values[zero]:.4g} +- {found.std[zero]:.2g} {unit}"
-            if zero in found.values
-            else ""
-        )
+    for dof in config.dof:
+        zero, gain, slack = (f"dof.{dof.name}.{key}" for key in ("zero", "gain", "slack"))
+        at = ""
+        if zero in found.values:
+            at = f", zero {found.values[zero]:.4g} +- {found.std[zero]:.2g} {dof.unit}"
         notes.append(
-            f"{name}: gain {found.values[gain]:.4g} +- {found.std[gain]:.2g}{at}, slack "
-            f"{found.values[slack]:.3g} {unit}; gain and zero are {written}"
+            f"{dof.name}: gain {found.values[gain]:.4g} +- {found.std[gain]:.2g}{at}, slack "
+            f"{found.values[slack]:.3g} {dof.unit}; gain and zero are {written}"
         )
     data = {"fit": dict(found.values)}
     return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)

@@ -112,26 +112,24 @@ def _ros2(options: argparse.Namespace) -> int:
             distribution=options.distribution,
             **endpoints,
         )
+    what = "a driver in ROS" if options.driver else rig_in_words(options)
+
+    def say(key: str, value: str, text: str) -> None:
+        print_json(options, {key: value})
+        print(text, flush=True)
+
+    def announce(name: str) -> None:
+        say("node", name, f"The node {name} commands {what}, once it is enabled. Ctrl-C ends.")
+
     with opened as node:
         folder.mkdir(parents=True, exist_ok=True)
         return start_node(
             config,
             node,
             folder,
-            lambda name: _announce(options, name),
+            announce,
             make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
-            on_result=lambda text: _print_now(options, "result", text, text),
+            on_result=lambda text: say("result", text, text),
         )
-
-
-def _announce(options: argparse.Namespace, name: str) -> None:
-    what = "a driver in ROS" if options.driver else rig_in_words(options)
-    text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
-    _print_now(options, "node", name, text)
-
-
-def _print_now(options: argparse.Namespace, key: str, value: str, text: str) -> None:
-    print_json(options, {key: value})
-    print(text, flush=True)

@@ -17,11 +17,7 @@ WINDOW = 120.0
 
 
 class Achieved:
-    """Records the last `WINDOW` of ticks with all compensation, and of those without any.
-
-    Args:
-        config: Of the loop.
-    """
+    """Records the last `WINDOW` of ticks with all compensation, and of those without any."""
 
     def __init__(self, config: Config) -> None:
         self._config, self._updates = config, 0

@@ -20,7 +20,6 @@ from tautscope.report.operator_motion import (
     evaluate_operator_motion,
     operator_motion,
 )
-from tautscope.report.report import FIGURE5_CAPTION
 from tautscope.report.results import ROWS, Results, combine, evaluate
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
@@ -51,15 +50,11 @@ _PROFILES = {
     "paper": "&ldquo;Paper&rdquo; is the article&rsquo;s scheme on the twin.",
     "best": "&ldquo;Best&rdquo; is this project&rsquo;s own scheme on the same twin.",
 }
-
-
 _OPERATOR_CAPTION = (
     "Operator motion, seed {}. (a)-(c) reference, command with compensation, and true tip without "
     "and with it, in 20 s of the run. (d)-(f) tracking error of the true tip; the grey part is "
     "not evaluated, because the offsets are still being estimated."
 )
-
-
 _FILM_CAPTION = (
     "The same motion of an operator without and with compensation, in the twin's camera. The rings "
     "are where the reference wants the two bands."
@@ -74,12 +69,8 @@ class Demo:
         config: Configuration of the first seed.
         seeds: The seed of each result.
         by_profile: Table 1 of each seed by profile; the configuration's own profile is the last.
-        uncompensated: The run without compensation.
-        compensated: The run with it.
-        article: The same with profile ``paper``, if the configuration has another one.
+        article: `compensated` with profile ``paper``, if the configuration has another one.
         operator_results: The figures of the operator motion of each seed.
-        operator_uncompensated: The operator motion without compensation.
-        operator_compensated: The operator motion with it.
         sim_seconds: Simulated time of all runs [s].
         wall_seconds: Computing time [s].
     """
@@ -198,9 +189,6 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     with _uncompensated, fig9.png, fig9.pdf, fig5.png; of the operator motion
     operator_motion.csv, .png and .pdf, film.gif, and trace and frames with _operator_motion and
     _operator_motion_uncompensated; report.html.
-
-    Raises:
-        OutputError: The folder is not empty, or cannot be written.
     """
     # Matplotlib takes half a second to import.
     from tautscope.figure_style import style  # noqa: PLC0415
@@ -208,19 +196,15 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     from tautscope.report.film import write_film  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
+    figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
+    motion = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)
     drawn = {
-        "fig9": (
-            figures.figure9(demo.uncompensated, demo.compensated, demo.article),
-            _figure9_caption(demo),
-        ),
-        "operator_motion": (
-            draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated),
-            _OPERATOR_CAPTION.format(demo.seeds[0]),
-        ),
+        "fig9": (figure9, _figure9_caption(demo)),
+        "operator_motion": (motion, _OPERATOR_CAPTION.format(demo.seeds[0])),
     }
     if demo.compensated.snapshot is not None:
         figure5 = figures.figure5(demo.compensated.snapshot, demo.config)
-        drawn["fig5"] = figure5, FIGURE5_CAPTION
+        drawn["fig5"] = figure5, report.FIGURE5_CAPTION
     with new_folder(folder) as place:
         demo.operator_compensated.write(place, "_operator_motion")
         demo.operator_uncompensated.write(place, "_operator_motion_uncompensated")

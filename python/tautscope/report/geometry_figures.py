@@ -23,11 +23,9 @@ _COLOURS = ((178, 114, 0), (0, 94, 213))
 def residual_figure(fit: GeometryFit) -> Figure:
     """Residuals of the features over time, and the tip over the motor of each DOF."""
     recording = fit.recording
-    time = recording.captured_at - recording.captured_at[0]
-    motors = np.stack(
-        [np.interp(recording.captured_at, recording.time, recording.motors[:, dof]) for dof in Dof],
-        axis=1,
-    )
+    captured_at, clock = recording.captured_at, recording.time
+    time = captured_at - captured_at[0]
+    motors = np.stack([np.interp(captured_at, clock, each) for each in recording.motors.T], axis=1)
     with style():
         figure = Figure(figsize=(PAGE, 4.2), layout="constrained")
         upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.2), squeeze=False).flat
@@ -54,14 +52,6 @@ def write_overlay(fit: GeometryFit, before: Config, file: Path) -> None:
     """Write a video (Motion JPEG, AVI) of the images with the predicted outlines of the bands.
 
     Orange: with the geometry before; blue: with the fitted one; both at the fitted tip.
-
-    Args:
-        fit: With the images of its record.
-        before: The configuration before.
-        file: The video.
-
-    Raises:
-        OutputError: The file cannot be written.
     """
     camera = before.camera
     size = (camera.width, camera.height)

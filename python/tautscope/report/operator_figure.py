@@ -69,26 +69,12 @@ def _draw_signals(axes: Axes, runs: Runs, dof: NamedDof) -> None:
     time = trace["time"] - trace["time"][0]
     for recording, colour in runs:
         stamps, tip, _ = tip_and_reference(recording, dof)
-        with_or_without = "with" if recording.compensated else "without"
-        axes.plot(
-            stamps - recording.trace["time"][0],
-            tip * dof.display_scale,
-            color=colour,
-            linewidth=1.1,
-            label=f"tip {with_or_without} compensation",
-        )
-    for name, colour, width, line in (
-        ("command", ORANGE, 0.7, "-"),
-        ("reference", BLACK, 0.8, "--"),
-    ):
-        axes.plot(
-            time,
-            trace[f"{name}_{dof.label}"] * dof.display_scale,
-            line,
-            color=colour,
-            linewidth=width,
-            label=name,
-        )
+        elapsed, shown = stamps - recording.trace["time"][0], tip * dof.display_scale
+        label = f"tip {'with' if recording.compensated else 'without'} compensation"
+        axes.plot(elapsed, shown, color=colour, linewidth=1.1, label=label)
+    for name, colour, width, line in ("command", ORANGE, 0.7, "-"), ("reference", BLACK, 0.8, "--"):
+        shown = trace[f"{name}_{dof.label}"] * dof.display_scale
+        axes.plot(time, shown, line, color=colour, linewidth=width, label=name)
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
     axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True, steps=[1, 2, 5, 10]))
 
@@ -96,12 +82,8 @@ def _draw_signals(axes: Axes, runs: Runs, dof: NamedDof) -> None:
 def _draw_errors(axes: Axes, runs: Runs, dof: NamedDof) -> None:
     for recording, colour in runs:
         time, tip, reference = tip_and_reference(recording, dof)
-        axes.plot(
-            time - recording.trace["time"][0],
-            (tip - reference) * dof.display_scale,
-            color=colour,
-            linewidth=0.7,
-        )
+        elapsed, errors = time - recording.trace["time"][0], (tip - reference) * dof.display_scale
+        axes.plot(elapsed, errors, color=colour, linewidth=0.7)
     axes.axhline(0, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)))
     axes.set_ylabel(f"error [{dof.display_unit}]")
     axes.set_xlim(0, math.ceil(recording.trace["time"][-1] - recording.trace["time"][0]))

@@ -1,6 +1,6 @@
 """Tracking of an operator motion: all DOFs at once, judged by the true tip where it is known."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,7 +43,6 @@ class OperatorResult:
         "reduction",
         "Share of the tracking error that compensation removes.",
         "share",
-        "min",
         (0.91, 0.81, 0.81),
     )
     largest: float = figure(
@@ -66,7 +65,6 @@ class OperatorResult:
         "bound of the reduction",
         "Reduction of a law that knows tip and slack exactly: no goal, but what could be reached.",
         "share",
-        "min",
     )
     slack: float = figure(
         "slack found", "Width of the slack that the loop has found by the end of the run."
@@ -160,13 +158,6 @@ def evaluate_operator_motion(
             slack=float(run[f"delta_plus_{dof.label}"][-1] - run[f"delta_minus_{dof.label}"][-1]),
         )
     return results
-
-
-def evaluate_uncompensated_motion(recording: Recording) -> OperatorResults:
-    """The figures of every DOF from a run without compensation; those of compensation are NaN."""
-    unknown = dict.fromkeys(("compensated_rms", "reduction", "largest"), np.nan)
-    found = evaluate_operator_motion(recording, recording, has_bound=False)
-    return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
 def _tracking_errors(

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tautscope._core import __version__
-from tautscope.report import tables
-from tautscope.report.operator_motion import (
-    OperatorResults,
-    evaluate_operator_motion,
-    evaluate_uncompensated_motion,
-)
-from tautscope.report.report import (
-    FIGURE5_CAPTION,
-    figure_list,
-    page,
-    recorded_motion_section,
-    table1_section,
-    warning_list,
-)
-from tautscope.report.results import Results, evaluate, evaluate_uncompensated
+from tautscope.dof import NamedDof
+from tautscope.report import report, tables
+from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
+from tautscope.report.results import Figures, Results, evaluate
 from tautscope.report.tables import finite, operator_to_json
 from tautscope.runs.recording import Recording, per_dof
 
@@ -74,7 +64,7 @@ class RecordedRun:
         if not self.is_experiment:
             return {}
         if not self.main.compensated:
-            return evaluate_uncompensated(self.main)
+            return _without_compensation(evaluate(self.main, self.main))
         return evaluate(self.uncompensated, self.main)
 
     @property
@@ -83,7 +73,8 @@ class RecordedRun:
         if self.is_experiment:
             return {}
         if not self.main.compensated:
-            return evaluate_uncompensated_motion(self.main)
+            found = evaluate_operator_motion(self.main, self.main, has_bound=False)
+            return _without_compensation(found)
         return evaluate_operator_motion(self.uncompensated, self.main)
 
     def to_json(self) -> dict[str, Any]:
@@ -123,10 +114,7 @@ class RecordedRun:
     ) -> None:
         """Write report.html, its figures, and table1.csv of the experiment, to an existing folder.
 
-        Args:
-            place: The folder.
-            facts: Further facts of the run.
-            further: Files and captions of further figures.
+        `further` figures have the names of their files, and captions.
         """
         # Matplotlib takes half a second to import.
         from tautscope.figure_style import style  # noqa: PLC0415
@@ -135,18 +123,18 @@ class RecordedRun:
         config, pictures = self.main.config, [self.figure(), *further]
         if self.main.snapshot is not None:
             drawn = figure5(self.main.snapshot, config)
-            pictures.append(("fig5.png", drawn, FIGURE5_CAPTION))
+            pictures.append(("fig5.png", drawn, report.FIGURE5_CAPTION))
         if results := self.results:
             tables.write_csv(place / "table1.csv", [config.twin.seed], {config.profile: [results]})
         with style():
             for name, figure, _ in pictures:
                 figure.savefig(place / name)
-            text = page(
+            text = report.page(
                 "on the rig named below",
                 f"""{self.section()}
-{warning_list(self.main.warnings)}
+{report.warning_list(self.main.warnings)}
 <h2>Figures</h2>
-{figure_list(each[1:] for each in pictures)}""",
+{report.figure_list(each[1:] for each in pictures)}""",
                 {"tautscope": __version__, **facts},
                 config,
             )
@@ -155,8 +143,8 @@ class RecordedRun:
     def section(self) -> str:
         """The tables as HTML."""
         if self.is_experiment:
-            return table1_section(self.results, is_tip_known=self.is_tip_known)
-        return recorded_motion_section(self.operator_results, self.tip)
+            return report.table1_section(self.results, is_tip_known=self.is_tip_known)
+        return report.recorded_motion_section(self.operator_results, self.tip)
 
     def figure(self) -> tuple[str, Figure, str]:
         """Name of its file, figure and caption."""
@@ -179,3 +167,13 @@ class RecordedRun:
             f"The motion, figures {self.tip}. Left: reference, command and tip, in a part of the "
             "run. Right: tracking error over the whole run.",
         )
+
+
+def _without_compensation(results: dict[NamedDof, Figures]) -> dict[NamedDof, Figures]:
+    """Figures of a run without compensation: those of compensation are NaN."""
+    of_compensation = ("compensated", "reduction", "start", "largest")
+    known = {}
+    for dof, found in results.items():
+        unknown = [each.name for each in fields(found) if each.name.startswith(of_compensation)]
+        known[dof] = replace(found, **dict.fromkeys(unknown, math.nan))
+    return known

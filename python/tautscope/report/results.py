@@ -39,7 +39,6 @@ class DofResult:
         "uncompensated width",
         "Slack: how far the command moves after a reversal before the tip does. Mean width of the "
         "loop of the tip over the command, without compensation.",
-        in_summary=True,
     )
     uncompensated_max: float = figure(
         "uncompensated width, largest", "The same loop where it is widest."
@@ -48,24 +47,19 @@ class DofResult:
         "compensated width",
         "What is left of the slack for the operator: mean width of the loop of the tip over the "
         "reference, with compensation. 0 is ideal; a negative width means that the tip leads.",
-        in_summary=True,
     )
     compensated_max: float = figure("compensated width, largest", "This loop where it is widest.")
     reduction: float = figure(
         "reduction",
         "Share of the mean width that compensation removes: 1 - |compensated| / uncompensated.",
         "share",
-        "min",
         (0.98, 0.96, 0.95),
-        in_summary=True,
     )
     reduction_max: float = figure(
         "reduction of the largest width",
         "The same share of the largest widths.",
         "share",
-        "min",
         (0.92, 0.88, 0.87),
-        in_summary=True,
     )
     uncompensated_estimate: float = figure(
         "uncompensated width, by camera",
@@ -76,7 +70,7 @@ class DofResult:
         "The compensated width with the tip as the camera measures it.",
     )
     reduction_estimate: float = figure(
-        "reduction, by camera", "The reduction of the two widths by camera.", "share", "min"
+        "reduction, by camera", "The reduction of the two widths by camera.", "share"
     )
     start_periods: float = figure(
         "periods until settled",
@@ -84,34 +78,27 @@ class DofResult:
         "how long the slack takes to be estimated.",
         "count",
         goal=1.0,
-        in_summary=True,
     )
     tracking_rms: float = figure(
-        "tracking error, RMS",
-        "Distance of the tip from the reference, once settled.",
-        in_summary=True,
+        "tracking error, RMS", "Distance of the tip from the reference, once settled."
     )
     tracking_estimate: float = figure(
         "tracking error, RMS, by camera",
         "The tracking error with the tip as the camera measures it.",
     )
     state_rms: float = figure(
-        "state error, RMS",
-        "Error of the loop's estimate of the tip at the time of each image.",
-        in_summary=True,
+        "state error, RMS", "Error of the loop's estimate of the tip at the time of each image."
     )
     marker_rms_px: float = figure(
         "marker error, RMS [px]",
         "Distance of a band's measured position in the image from its true one.",
         "number",
-        in_summary=True,
     )
     frames_used: float = figure(
         "frames used",
         "Share of the images that determined this degree of freedom. A straight instrument does "
         "not show its rotation.",
         "share",
-        "min",
     )
     tip_overspeed: float = figure(
         "tip overspeed",
@@ -138,24 +125,9 @@ def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results
 
     The uncompensated run is optional, and so is a DOF's segment in it.
     """
-    plain = () if uncompensated is None else tuple(each.dof for each in uncompensated.segments)
     return {
-        segment.dof: _dof_result(
-            segment, uncompensated if segment.dof in plain else None, compensated
-        )
-        for segment in compensated.segments
+        each.dof: _dof_result(each, uncompensated, compensated) for each in compensated.segments
     }
-
-
-def evaluate_uncompensated(recording: Recording) -> Results:
-    """The figures of every DOF with a segment, from a run without compensation.
-
-    Those of compensation are NaN.
-    """
-    names = [row.name for row in ROWS if row.name.startswith(("compensated", "reduction", "start"))]
-    unknown = dict.fromkeys(names, np.nan)
-    found = evaluate(recording, recording)
-    return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
 def combine(
@@ -221,7 +193,7 @@ def _dof_result(
 ) -> DofResult:
     label = segment.dof.label
     before = before_estimate = metrics.loop_width([], [])
-    if uncompensated is not None:
+    if uncompensated is not None and segment.dof in {each.dof for each in uncompensated.segments}:
         before = metrics.loop_width(*true_loop(uncompensated, segment, "command"))
         before_estimate = metrics.loop_width(*estimated_loop(uncompensated, segment, "command"))
     after = metrics.loop_width(*true_loop(compensated, segment, "reference"))
@@ -229,16 +201,11 @@ def _dof_result(
 
     rows = compensated.trace[compensated.during(segment, 0, segment.periods)]
     time, reference, truth = rows["time"], rows[f"reference_{label}"], rows[f"true_{label}"]
-    start = metrics.start_periods(
-        metrics.period_widths(
-            time,
-            reference,
-            truth,
-            start=float(compensated.trace["time"][0]) + segment.start,
-            period=segment.period,
-            periods=segment.periods,
-        )
+    first = float(compensated.trace["time"][0]) + segment.start
+    widths = metrics.period_widths(
+        time, reference, truth, start=first, period=segment.period, periods=segment.periods
     )
+    start = metrics.start_periods(widths)
     begin = float(np.nan_to_num(start))
     settled = compensated.trace[compensated.during(segment, begin, segment.periods)]
     frames = compensated.frames[compensated.frames[f"observable_{label}"]]

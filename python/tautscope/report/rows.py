@@ -20,20 +20,15 @@ class Row:
         meaning: What it is, in a sentence for a reader who has seen nothing else.
         kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
             ``count`` have no conversion.
-        worst: Whether the worst value is the smallest or the largest; a goal is a lower or an upper
-            limit accordingly.
         goal: Limit for profile ``best`` on the twin, of all DOFs or of each [m or rad, fraction];
             the goals of docs/hysteresis.md.
-        in_summary: Whether ``--json`` contains it.
         name: Of the field.
     """
 
     title: str
     meaning: str
     kind: Literal["length", "share", "number", "count"] = "length"
-    worst: Literal["min", "max"] = "max"
     goal: float | tuple[float, float, float] | None = None
-    in_summary: bool = False
     name: str = ""
 
     def limit(self, dof: NamedDof) -> float | None:
@@ -42,15 +37,19 @@ class Row:
             return None
         return self.goal[dof] if isinstance(self.goal, tuple) else self.goal
 
-    def holds(self, dof: NamedDof, value: float) -> bool | None:
-        """Whether a value meets the goal; None without one. An unknown value does not."""
+    @property
+    def worst(self) -> Literal["min", "max"]:
+        """Whether the smallest value is the worst and a goal a lower limit, or the reverse."""
+        return "min" if self.kind == "share" else "max"
+
+    def is_missed(self, dof: NamedDof, value: float) -> bool:
+        """Whether there is a goal that a value, perhaps an unknown one, does not meet."""
         limit = self.limit(dof)
         if limit is None:
-            return None
+            return False
         rounding = 1e-9 * limit
-        if self.worst == "max":
-            return value <= limit + rounding
-        return value >= limit - rounding
+        is_met = value <= limit + rounding if self.worst == "max" else value >= limit - rounding
+        return not is_met
 
 
 def figure(*args: Any, **options: Any) -> Any:

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,9 @@ from tautscope.report.rows import ARTICLE, Row, rows_of
 
 SMALLEST = 0.001
 """Length that a sentence tells from nothing [mm or rad]."""
+_SIZES = ("uncompensated", "compensated", "reduction", "reduction_max")
+IN_SUMMARY = (*_SIZES, "start_periods", "tracking_rms", "state_rms", "marker_rms_px")
+"""Figures that ``--json`` contains."""
 
 
 def in_display_unit(row: Row, dof: NamedDof, value: float) -> float:
@@ -125,18 +128,16 @@ def summary(results: Sequence[dict[NamedDof, DofResult]]) -> dict[str, Any]:
     return {
         dof.label: {
             "unit": dof.display_unit,
-            **dict(_summary(dof, middle[dof])),
-            "worst": dict(_summary(dof, bad[dof])),
+            **_summary(dof, middle[dof]),
+            "worst": _summary(dof, bad[dof]),
         }
         for dof in middle
     }
 
 
-def _summary(dof: NamedDof, result: DofResult) -> Iterator[tuple[str, float | None]]:
-    for row in ROWS:
-        if row.in_summary:
-            value = in_display_unit(row, dof, getattr(result, row.name))
-            yield row.name, finite_or_none(value)
+def _summary(dof: NamedDof, result: DofResult) -> dict[str, float | None]:
+    rows = [row for row in ROWS if row.name in IN_SUMMARY]
+    return finite({row.name: in_display_unit(row, dof, getattr(result, row.name)) for row in rows})
 
 
 def finite(figures: Mapping[str, float]) -> dict[str, float | None]:

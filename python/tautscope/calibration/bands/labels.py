@@ -56,12 +56,7 @@ class LabelledImage:
 
 
 def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
-    """Label an image by the masks of its bands, which lose their blurred edges.
-
-    Args:
-        image: B, G, R.
-        bands: One mask per band, not 0 on it.
-    """
+    """Label an image by masks, not 0 on one band each, which lose their blurred edges."""
     labels = np.full(image.shape[:2], BACKGROUND, np.uint8)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RIM + 1,) * 2)
     masks = [(band > 0).astype(np.uint8) for band in bands]
@@ -125,12 +120,8 @@ def label_clicks(image: Image, clicks: Sequence[tuple[int, int]]) -> LabelledIma
     The region around each pixel grows with the tolerance of its colour until it runs into its
     surroundings: the largest region before the first jump of its area.
 
-    Args:
-        image: B, G, R.
-        clicks: u, v of a pixel on each of the two bands [px].
-
     Raises:
-        FieldError: There are not two clicks, or one is outside the image.
+        FieldError: There are not two clicks u, v [px], or one is outside the image.
         CalibrationError: A region cannot be told from its surroundings, or is that of the other.
     """
     height, width = image.shape[:2]

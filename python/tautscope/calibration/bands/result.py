@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -51,7 +52,6 @@ def fit_colour(images: Sequence[LabelledImage]) -> ColourFit:
     Fewer than `LEAST_SPLIT` images serve for both.
 
     Raises:
-        FieldError: As `fit_discriminant`.
         CalibrationError: A band, or everything else, is not classified as it should.
     """
     train, check = (images[::2], images[1::2]) if len(images) >= LEAST_SPLIT else (images, images)
@@ -75,9 +75,10 @@ def fit_colour(images: Sequence[LabelledImage]) -> ColourFit:
 
 
 def colour_result(
-    fit: ColourFit, images: Sequence[LabelledImage], serial_numbers: Mapping[str, str]
+    images: Sequence[LabelledImage], serial_numbers: Mapping[str, str] = MappingProxyType({})
 ) -> CalibrationResult:
-    """The result of a fit."""
+    """The result of `fit_colour` in the form that all calibrations have."""
+    fit = fit_colour(images)
     values = {
         "vision.weights": tuple(round(float(weight), 4) for weight in fit.weights),
         "vision.threshold": round(float(fit.threshold), 2),

@@ -70,12 +70,7 @@ class Board:
         return modules.repeat(pixels_per_module, axis=0).repeat(pixels_per_module, axis=1)
 
     def write_pdf(self, path: Path) -> None:
-        """Write the board in true scale on a page of A4, with a ruler to check the print.
-
-        Raises:
-            FieldError: The board is larger than the page.
-            OutputError: The file cannot be written.
-        """
+        """Write the board in true scale on a page of A4, with a ruler to check the print."""
         from matplotlib.figure import Figure  # noqa: PLC0415
 
         width, height = self.columns * self.square, self.rows * self.square

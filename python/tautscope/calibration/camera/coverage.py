@@ -40,7 +40,6 @@ class Coverage:
         size: Width and height of the images [px].
         corners: (ROWS, COLUMNS) corners seen per cell.
         tilts: Views per tilt.
-        views: Number of views.
     """
 
     size: tuple[int, int]
@@ -92,16 +91,9 @@ class Coverage:
 
 
 class ViewCollector:
-    """Collects views of a board, and counts why images are not used.
+    """Collects views of a board in images of a size [px], and counts why images are not used.
 
-    Args:
-        board: The board.
-        size: Width and height of the images [px].
-        is_stream: Whether images are consecutive; then only views at rest that differ are used.
-
-    Attributes:
-        views, coverage: The views used, and how they cover the image.
-        rejected: Number of images not used, by reason.
+    Of a stream, whose images are consecutive, only views at rest that differ are used.
     """
 
     def __init__(self, board: Board, size: tuple[int, int], *, is_stream: bool) -> None:
@@ -124,11 +116,7 @@ class ViewCollector:
         return f"{self.coverage.text()}; " + (f"next: {steps[0]}" if steps else "complete")
 
     def check(self) -> None:
-        """Check that the views suffice.
-
-        Raises:
-            CalibrationError: They do not; it says why images were not used, and what to show.
-        """
+        """Check that the views suffice; the error says why images were not used, what to show."""
         if not (steps := self.coverage.next_steps()):
             return
         reasons = [f"{count} images {reason}" for reason, count in self.rejected.most_common()]

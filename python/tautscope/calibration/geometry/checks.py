@@ -73,8 +73,7 @@ def check_record(recording: Recording, config: Config) -> None:
                 f"a travel of {scale * travel[dof]:.3g} {unit}",
                 f"at least {scale * LEAST_TRAVEL * limit:.3g} {unit}, more than its slack; does "
                 "the drive report its position, are the motors in the order insertion, rotation, "
-                "bending, and is experiment."
-                f"{dof.label}.amplitude large enough?",
+                f"bending, and is experiment.{dof.label}.amplitude large enough?",
             )
     spread = float(np.nanstd(recording.features, axis=0).max())
     if spread < LEAST_SPREAD:

@@ -100,23 +100,18 @@ def fit(
     model = Model(config, recording.with_bands(), band_distance)
     solution = solve(model, active)
     for _ in range(DETECTIONS if recording.patches else 0):
-        recording = _detect_again(recording, config, model, solution, band_distance)
+        recording = _detect_again(recording, model, solution)
         check_record(recording, config)
         model = Model(config, recording.with_bands(), band_distance)
         solution = solve(model, active, solution.z)
     free = solve(model, active, solution.z, free_states=True)
-    return _result(recording, config, model, (solution, free), active)
+    return _result(recording, model, solution, free, active)
 
 
-def _detect_again(
-    recording: Recording,
-    config: Config,
-    model: Model,
-    solution: Solution,
-    band_distance: float | None,
-) -> Recording:
+def _detect_again(recording: Recording, model: Model, solution: Solution) -> Recording:
     """The record with the bands searched near the fitted or expected tip of every image."""
-    tips = Model(config, recording, band_distance).expected(solution.z)[:, :3]
+    config = model.config
+    tips = Model(config, recording, model.band_distance).expected(solution.z)[:, :3]
     tips[recording.found] = solution.states[:, :3]
     detector = MarkerDetector(model.configured(solution.z))
     std = TIP_STD * np.array(config.safety.width_limit)
@@ -132,17 +127,16 @@ def _detect_again(
 
 def _result(
     recording: Recording,
-    config: Config,
     model: Model,
-    solutions: tuple[Solution, Solution],
+    solution: Solution,
+    free: Solution,
     active: NDArray[np.bool_],
 ) -> GeometryFit:
-    solution, _ = solutions
-    doubts, warnings = checks.find_doubts(model, *solutions, active)
+    doubts, warnings = checks.find_doubts(model, solution, free, active)
     if short := checks.shortness(recording):
         warnings.append(short)
-    values = estimated_values(config, model, solution, active)
-    changes, stds = changes_and_stds(config, model.configured(solution.z), values)
+    values = estimated_values(model, solution, active)
+    changes, stds = changes_and_stds(model.config, model.configured(solution.z), values)
     delay = next(value for value in values if value.name == "camera.source.delay")
     if delay.after < -2 * delay.std:
         warnings.append(
@@ -157,7 +151,7 @@ def _result(
         return whole
 
     return GeometryFit(
-        config=config.replace(**changes),
+        config=model.config.replace(**changes),
         changes=changes,
         std=stds,
         pose_covariance=(solution.covariance * np.outer(model.prior_std, model.prior_std))[:6, :6],

@@ -44,17 +44,15 @@ class Model:
     The elastic share a of insertion is the slope of the tip within the play, where a channel gives
     way under a shaft that sticks to it; for rotation and bending, a = 0.
 
-    Args:
-        config: The configuration that the parameters are differences from.
-        data: The record; all of its images are used.
-        band_distance: Measured distance of the bands [m], or None.
+    The parameters are differences from a configuration; all images of the record are used. The
+    distance of the bands [m] may be measured.
     """
 
     def __init__(self, config: Config, data: Recording, band_distance: float | None) -> None:
         step = max(int(_TICK / np.median(np.diff(data.time)) + 0.5), 1)
         self.data = replace(data, time=data.time[::step], motors=data.motors[::step])
         self.count = len(data.captured_at)
-        self._config, self._band_distance = config, band_distance
+        self.config, self.band_distance = config, band_distance
         self.prior_std = parameters.prior_std(by_band_distance=band_distance is not None)
         self.is_scale_of_drive = band_distance is None
         self._radius = config.instrument.diameter / 2
@@ -64,7 +62,7 @@ class Model:
 
     def configured(self, z: Floats) -> Config:
         """The configuration for parameters z in standard deviations of their priors."""
-        return parameters.configured(self._config, self._band_distance, z * self.prior_std)
+        return parameters.configured(self.config, self.band_distance, z * self.prior_std)
 
     def features(self, z: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Features (n, 4) and their derivatives (n, 4, 4) by the states (n, 4).

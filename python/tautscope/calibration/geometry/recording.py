@@ -78,12 +78,6 @@ class Recording:
     saturated: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check shapes and numbers.
-
-        Raises:
-            SignalError: An array has another shape, motors or times are not finite, the time does
-                not increase, or images are not in order.
-        """
         ticks, images = len(self.time), len(self.captured_at)
         for name, shape in (
             ("time", (ticks,)),
@@ -122,10 +116,6 @@ class Recorder(ImageRecorder):
     The bands are searched without a prediction, because the configured geometry is what is unknown.
     Where it is so wrong that no posture explains most of the images, the centroids of the two
     regions of the bands' colour are taken instead, until the fit searches again.
-
-    Args:
-        config: Camera, instrument and vision.
-        executor: As of `ImageRecorder`.
     """
 
     def __init__(self, config: Config, executor: Executor | None = None) -> None:
@@ -137,11 +127,7 @@ class Recorder(ImageRecorder):
         self._reasons = Counter[str]()
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
-        """Search the bands in an image, and keep its features and its pixels around the bands.
-
-        Raises:
-            FrameError: The image is not what the configured camera gives.
-        """
+        """Search the bands in an image, and keep its features and its pixels around the bands."""
         self.used(captured_at)
         detection = self._detector.detect(image)
         if not detection.valid:
@@ -175,15 +161,10 @@ class Recorder(ImageRecorder):
         captured_at, features, by_regions, patches, saturated = zip(*images, strict=True)
         if np.isfinite(features).all(axis=1).mean() < LEAST_FOUND:
             features = by_regions
-        return Recording(
-            np.array(times),
-            np.array(motors),
-            np.array(captured_at),
-            np.array(features),
-            patches,
-            dict(self._reasons.most_common()),
-            float(np.median(saturated)),
-        )
+        columns = times, motors, captured_at, features
+        time, positions, stamps, points = (np.array(each) for each in columns)
+        reasons, share = dict(self._reasons.most_common()), float(np.median(saturated))
+        return Recording(time, positions, stamps, points, patches, reasons, share)
 
     def _patch(self, image: Image, detection: Detection) -> Patch:
         camera = self._camera

@@ -37,11 +37,11 @@ class Value:
 
 
 def estimated_values(
-    config: Config, model: Model, solution: Solution, active: NDArray[np.bool_]
+    model: Model, solution: Solution, active: NDArray[np.bool_]
 ) -> tuple[Value, ...]:
     """The estimated parameters; without a key of their own they are differences from 0."""
-    fitted = model.configured(solution.z)
-    start, end = _values(config, config), _values(fitted, config)
+    config = model.config
+    start, end = _values(config, config), _values(model.configured(solution.z), config)
     difference = solution.z * model.prior_std
     std = np.sqrt(np.diag(solution.covariance))
     found = []

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.model import PLAYS, Model
-from tautscope.calibration.robot.parameters import Parameter, fitted
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 from tautscope.loop.kinematics import Floats
@@ -73,15 +72,14 @@ def fit(record: MotionRecord, config: Config, keep: Sequence[str] = ()) -> Robot
         CalibrationError: There are too few measurements.
         FieldError: `keep` names no parameter.
     """
-    parameters = fitted(config, record.measurements, keep)
-    model = Model(record, config, parameters, np.ones(len(config.dof)))
+    model = Model(record, config, keep)
     if len(model.own) < LEAST:
         what = f"{len(model.own)} measurements in the motion"
         raise CalibrationError(what, f"Move for longer: {LEAST} are needed")
-    p = _first(model, parameters)
+    p = _first(model)
     limits = np.array([dof.width_limit for dof in config.dof])
     variance = (DEVIATION * limits) ** 2
-    fitting = _Fitting(model, parameters)
+    fitting = _Fitting(model)
     for number in range(_PASSES):
         fitting.weigh(p, variance)
         p = fitting.solve(p)
@@ -93,8 +91,8 @@ def fit(record: MotionRecord, config: Config, keep: Sequence[str] = ()) -> Robot
 class _Fitting:
     """The weights of the residuals, and the solver."""
 
-    def __init__(self, model: Model, parameters: Sequence[Parameter]) -> None:
-        self._model, self._parameters = model, parameters
+    def __init__(self, model: Model) -> None:
+        self._model, parameters = model, model.parameters
         weights = model.half_widths.size
         self._prior = model.start()
         self._std = np.array([*[each.std for each in parameters], *[WEIGHT_STD] * weights])
@@ -154,12 +152,11 @@ class _Fitting:
         weights = model.weights_from
         covariance = self._covariance(p)
         std = np.sqrt(np.diag(covariance))
-        names = [each.name for each in self._parameters]
-        values = dict(zip(names, p.tolist(), strict=False))
-        stds = dict(zip(names, std.tolist(), strict=False))
+        values = dict(zip(model.names, p.tolist(), strict=False))
+        stds = dict(zip(model.names, std.tolist(), strict=False))
         lost = [
             each.name
-            for each in self._parameters
+            for each in model.parameters
             if stds[each.name] > UNDETERMINED * each.std and not each.name.endswith(".lag")
         ]
         for index, dof in enumerate(model.config.dof):
@@ -207,9 +204,8 @@ class _Fitting:
         return np.asarray(inverse * np.outer(larger, larger))
 
 
-def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
+def _first(model: Model) -> Floats:
     """Start: the signs of the motors, and the base's pose if it is fitted, by Kabsch's method."""
-    names = [each.name for each in parameters]
     base = {f"kinematics.base_{of}[{k}]" for of in ("position", "rotation") for k in range(3)}
     noise = np.sqrt(np.einsum("kmm->km", model.covariance))
     best, found = np.inf, model.start()
@@ -217,8 +213,8 @@ def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
     for signs in trials:
         model.signs = np.array(signs)
         p = model.start()
-        if base.issubset(names):
-            p = _aligned(model, p, names.index("kinematics.base_position[0]"))
+        if base.issubset(model.names):
+            p = _aligned(model, p, model.names.index("kinematics.base_position[0]"))
         left = (model.values - model.predict(p, model.motion(p)[0])) / noise
         misfit = float(np.mean(np.abs(left)))
         if misfit < _PREFERRED * best:

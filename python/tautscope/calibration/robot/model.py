@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tautscope._core import Play
 from tautscope.calibration.motion import MotionRecord
-from tautscope.calibration.robot.parameters import Parameter, with_values
+from tautscope.calibration.robot.parameters import fitted, with_values
 from tautscope.config import Config
 from tautscope.loop.kinematics import STEP, Floats, build_kinematics, own_kinematics
 from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, Tip, check_rotation
@@ -41,11 +41,9 @@ class Model:
         times: (N,) time stamps [s].
     """
 
-    def __init__(
-        self, record: MotionRecord, config: Config, parameters: Sequence[Parameter], signs: Floats
-    ) -> None:
-        self.config, self.parameters = config, parameters
-        self._record, self.signs = record, signs
+    def __init__(self, record: MotionRecord, config: Config, keep: Sequence[str]) -> None:
+        self.config, self.parameters = config, fitted(config, record.measurements, keep)
+        self._record, self.signs = record, np.ones(len(config.dof))
         self.own = _own(record)
         sensors = Sensors(config, build_kinematics(config))
         self.readings = [sensors.reading(each) for each in self.own]
@@ -74,8 +72,8 @@ class Model:
             [Play(delta_minus=-r, delta_plus=r, output=float(c[0])).run(c) for r in half_widths]
             for c, half_widths in zip(record.commands.T, self.half_widths, strict=True)
         ]
-        self._names = [each.name for each in parameters]
-        self.weights_from = len(parameters)
+        self.names = [each.name for each in self.parameters]
+        self.weights_from = len(self.names)
 
     def start(self) -> Floats:
         """Parameters at their starts, then the weights (n, PLAYS) of the plays."""
@@ -84,7 +82,7 @@ class Model:
 
     def motion(self, p: Floats) -> tuple[Floats, Floats]:
         """States (N, n), and plays (N, n, PLAYS) by whose weights they change."""
-        known = dict(zip(self._names, p.tolist(), strict=False))
+        known = dict(zip(self.names, p.tolist(), strict=False))
         given = (*self.config.measurement.delays, *[0.0] * 4)
         delays = [known.get(f"measurement.delays[{k}]", given[k]) for k in self._sensor]
         shown, names = self.times - delays, [dof.name for dof in self.config.dof]
@@ -100,7 +98,7 @@ class Model:
 
     def predict(self, p: Floats, states: Floats) -> Floats:
         """(N, M) values that would be measured in states (N, n), 0 where nothing was."""
-        changes = with_values(self.config, dict(zip(self._names, p.tolist(), strict=False)))
+        changes = with_values(self.config, dict(zip(self.names, p.tolist(), strict=False)))
         own = {key: each for key, each in changes.items() if key.startswith("kinematics.")}
         config = self.config.replace(**own) if own else self.config
         found = np.zeros(self.values.shape)

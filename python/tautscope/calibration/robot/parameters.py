@@ -1,4 +1,4 @@
-"""Parameters of a robot's calibration: where they start, and how far they may be from there."""
+"""Parameters of a robot's calibration: priors, and what they change in a configuration."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -35,10 +35,8 @@ def fitted(
     """The parameters that a configuration and its sensors have, less those to keep.
 
     The zeros of an insertion along and a rotation about the axis of "two_planes" are those of the
-    motors: they could not be told from the pose of the base.
-
-    Raises:
-        FieldError: `keep` names none, and is not "kinematics", of which a robot may have nothing.
+    motors: they could not be told from the pose of the base. A name to keep has to be one of them,
+    but "kinematics", of which a robot may have nothing.
     """
     kinds = {type(each) for each in measurements}
     poses = [each for each in measurements if isinstance(each, Pose)]
@@ -89,6 +87,46 @@ def with_values(config: Config, values: Mapping[str, float]) -> dict[str, Any]:
         items += [0.0] * (int(index) + 1 - len(items))
         items[int(index)] = max(value, 0.0) if section == "measurement" else value
     return changes
+
+
+def motor_map(
+    config: Config, values: Mapping[str, float], std: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Changes of section ``actuators`` with which gains are 1 and zeros 0, and their deviations.
+
+    The tip is at zero + gain c, and the motors at M c + o; for a tip at c' they have to be at
+
+        M diag(1 / gain) c' + o - M (zero / gain).
+
+    A rig without the section takes the command: M is the identity. With a function of the user's in
+    place of M there are no changes.
+    """
+    actuators, names = config.actuators, [dof.name for dof in config.dof]
+    changes: dict[str, Any] = {}
+    if actuators is None:
+        matrix, offsets = np.eye(len(names)), np.zeros(len(names))
+        units = [str(dof.unit) for dof in config.dof]
+        changes = {"actuators.names": names, "actuators.units": units}
+    elif actuators.map:
+        return {}, {}
+    else:
+        matrix = np.array(actuators.matrix)
+        offsets = np.array(actuators.offsets or [0.0] * len(matrix))
+    (gain, zero), (gain_std, zero_std) = (
+        np.array([[of.get(f"dof.{name}.{key}", 0.0) for name in names] for key in ("gain", "zero")])
+        for of in (values, std)
+    )
+    scaled = matrix / gain + 0.0  # no -0.0
+    by_gain = np.abs(scaled) * gain_std / np.abs(gain)
+    by_offset = np.hypot(scaled @ np.diag(zero_std), by_gain * zero)
+    changes["actuators.matrix"] = scaled.tolist()
+    changes["actuators.offsets"] = (offsets - scaled @ zero).tolist()
+    stds = {
+        f"actuators.matrix[{row}][{column}]": float(each)
+        for (row, column), each in np.ndenumerate(by_gain)
+    }
+    total = np.sqrt(np.sum(by_offset**2, axis=1))
+    return changes, stds | {f"actuators.offsets[{k}]": float(each) for k, each in enumerate(total)}
 
 
 def _vector(config: Config, key: str, std: float) -> list[Parameter]:
