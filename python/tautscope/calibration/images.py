@@ -30,7 +30,12 @@ def to_bgr(image: Image, pixel_format: PixelFormat) -> Image:
 
 
 def read_image(file: Path, *, is_grey: bool = False) -> Image:
-    """Read an image file: B, G, R or grey."""
+    """Read an image file: B, G, R or grey.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        FieldError: OpenCV does not read it.
+    """
     if not file.is_file():
         raise MissingPathError("image", str(file), "an image file")
     image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE if is_grey else cv2.IMREAD_COLOR)

@@ -196,7 +196,11 @@ class ImageRecorder(ABC):
         self._due = captured_at + self.period - 1e-9
 
     def check_is_complete(self, images: int) -> None:
-        """Check that there are positions, and `images` that were kept."""
+        """Check that there are positions, and `images` that were kept.
+
+        Raises:
+            RecordError: There is no motor position or no image.
+        """
         if not self.ticks or not images:
             found = f"{len(self.ticks)} motor positions and {images} images"
             raise RecordError("recording", found, "both, of the same motion")

@@ -54,6 +54,9 @@ def refuse_unused(options: argparse.Namespace, allowed: str, *names: str) -> Non
     """Refuse options, of which a verb may lack some, that would have no effect.
 
     `allowed` is what they need beside them, for the error.
+
+    Raises:
+        FieldError: One of them has another value than by default.
     """
     for name in names:
         value = getattr(options, name, None)
@@ -80,7 +83,11 @@ def add_config(
 def article_config(
     path: str | PathLike[str] | None = None, profile: Profile | None = None
 ) -> Config:
-    """As `load_config`, of the article's instrument, which most commands are for."""
+    """As `load_config`, of the article's instrument, which most commands are for.
+
+    Raises:
+        ConfigError: As `load_config`; the configuration has [[dof]].
+    """
     config = load_config(path, profile)
     if config.dof:
         found = ", ".join(dof.name for dof in config.dof)
@@ -107,7 +114,11 @@ def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
 
 
 def out_folder(options: argparse.Namespace) -> Path:
-    """The folder of ``--out``, or one with date and verb in its name; it can be written."""
+    """The folder of ``--out``, or one with date and verb in its name; it can be written.
+
+    Raises:
+        OutputError: It is not empty, or cannot be written.
+    """
     return check_free(options.out or default_folder(options.verb))
 
 

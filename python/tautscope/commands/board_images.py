@@ -45,7 +45,12 @@ class BoardImages:
 
 
 def file_images(files: Sequence[Path]) -> BoardImages:
-    """Images of image files, or of one video."""
+    """Images of image files, or of one video.
+
+    Raises:
+        MissingPathError: A file does not exist.
+        FieldError: A file is no image, or no video.
+    """
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) == 1 and files[0].suffix.lower() not in _SUFFIXES:

@@ -96,6 +96,9 @@ def result(
 
     The calibration of the geometry has estimated it too. The value with the smaller standard
     deviation is kept; if both disagree, there is no answer.
+
+    Raises:
+        CalibrationError: There is no answer, or the images are stamped before they are captured.
     """
     if not found.is_known:
         remedy = "Give camera.source.delay yourself, or leave out this step: docs/recordings.md"

@@ -33,6 +33,10 @@ def check_options(options: argparse.Namespace, *, reads_config: bool = True) -> 
     """Check before anything runs that the results can be written.
 
     `reads_config`: whether ``--config`` is more than the file of ``--write``.
+
+    Raises:
+        FieldError: ``--write`` without ``--config``, or ``--config`` without an effect.
+        OutputError: The folder is taken or cannot be written.
     """
     if options.write:
         if options.config is None:

@@ -155,7 +155,11 @@ def run_protocol(
 
 
 def refuse_wrong_limits(config: str | None) -> None:
-    """Refuse a configuration in which values of the drives or of [[dof]] are placeholders."""
+    """Refuse a configuration in which values of the drives or of [[dof]] are placeholders.
+
+    Raises:
+        ConfigError: Names the keys.
+    """
     marked = [key for key in placeholders(config) if re.match(r"(drives|dof)\b", key)]
     if marked:
         allowed = f"your values, and lines without the word {MARK}: the motors would move wrongly"
@@ -163,6 +167,10 @@ def refuse_wrong_limits(config: str | None) -> None:
 
 
 def confirm_motion(options: argparse.Namespace, what: str, config: Config) -> None:
-    """Ask whether the motors may move, unless ``--yes``."""
+    """Ask whether the motors may move, unless ``--yes``.
+
+    Raises:
+        FieldError: The answer is not y.
+    """
     text = f"{what} tissue and hands away, the emergency stop within reach."
     confirm(f"THE MOTORS WILL MOVE, {text}", options, config.camera)

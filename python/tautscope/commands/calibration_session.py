@@ -37,6 +37,10 @@ class CalibrationSession:
 
     A new one has its report in `folder`; `restart` drops one that is unfinished. On a rig the seed,
     that of the twin, is None.
+
+    Raises:
+        MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or the
+            session to be resumed is of another rig.
     """
 
     def __init__(self, file: Path, folder: Path, seed: int | None, *, restart: bool) -> None:

@@ -61,7 +61,12 @@ def read_positions(path: str, units: str, config: Config) -> tuple[Floats, Float
 
 
 def read_reference(options: argparse.Namespace, config: Config) -> RecordedReference | None:
-    """The motion of ``--reference``, within the drives' travel; None without the option."""
+    """The motion of ``--reference``, within the drives' travel; None without the option.
+
+    Raises:
+        FieldError: ``--units`` without ``--reference``.
+        RecordError: The file cannot be used, or a position is outside the drives' travel.
+    """
     if options.reference is None:
         if options.units:
             raise FieldError(
@@ -97,7 +102,11 @@ def add_video_options(parser: argparse.ArgumentParser, start_help: str) -> None:
 
 
 def check_video_options(options: argparse.Namespace) -> None:
-    """Check that there is either a log or a video with motor positions."""
+    """Check that there is either a log or a video with motor positions.
+
+    Raises:
+        FieldError: There is not, or an option of videos is given with a log.
+    """
     if (options.file is None) == (options.video is None):
         given = None if options.file is None else "a log and --video"
         raise FieldError(options.verb, given, "a log, or --video with --motors")

@@ -36,6 +36,10 @@ def choose_rig(
 
     With `in_real_time` the steps of ``--rig`` and ``--robot`` take a control period, and each reset
     makes the rig anew; drives do so by themselves.
+
+    Raises:
+        ConfigError: The configuration does not describe such a rig.
+        FieldError: ``--robot`` without ``--twin``, of a command that has it.
     """
     names = ("rig", "robot", "twin", "profile", "seed")
     rig, robot, is_twin, profile, seed = (getattr(options, name, None) for name in names)

@@ -54,7 +54,12 @@ def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
 
 
 def writable_file(path: str | PathLike[str]) -> Path:
-    """The file of a configuration that may be changed; it exists, and is not a shipped one."""
+    """The file of a configuration that may be changed; it exists, and is not a shipped one.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        ConfigError: It is a shipped configuration.
+    """
     file = Path(path)
     if file.is_file():
         return file

@@ -112,7 +112,11 @@ class ControlRun(ControlLoop):
         return next((state for at, state in reversed(kept) if at <= time), self.uncompensated)
 
     def tick(self) -> list[Update]:
-        """Compute the command; the updates that have ended."""
+        """Compute the command; the updates that have ended.
+
+        Raises:
+            ConfigError: The rig differs from its configuration.
+        """
         began, sample, period = time.monotonic(), self.sample, self._rig.control_period
         self.late += self.ticks > 0 and began - self._began > LATE * period
         self._began = began

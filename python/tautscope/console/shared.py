@@ -60,7 +60,11 @@ class Slots:
         return self._stride - _HEADER.size
 
     def write(self, data: bytes) -> int:
-        """Write a record; its number."""
+        """Write a record; its number.
+
+        Raises:
+            ValueError: It is longer than `capacity`.
+        """
         if len(data) > self.capacity:
             raise ValueError(f"a record of {len(data)} bytes, longer than {self.capacity}")
         number = self._written + 1

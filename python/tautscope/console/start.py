@@ -57,7 +57,11 @@ def start_console(
 
 @contextmanager
 def web_server(config: Config, port: int) -> Iterator[tuple[BaseProcess, Channels, str]]:
-    """A web server in a process of its own, this process's channels, and the page's address."""
+    """A web server in a process of its own, this process's channels, and the page's address.
+
+    Raises:
+        ConfigError: The port is taken.
+    """
     context = multiprocessing.get_context("spawn")
     memory, token = SharedMemory(context, config), secrets.token_urlsafe(32)
     with socket.socket() as listener:

@@ -216,7 +216,11 @@ class CanopenMaster:
 
 
 def open_bus(config: DrivesConfig) -> can.BusABC:
-    """Open the configured CAN bus."""
+    """Open the configured CAN bus.
+
+    Raises:
+        BusError: The bus cannot be opened.
+    """
     options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
     try:
         return can.Bus(interface=config.interface, channel=config.channel, **options)

@@ -111,7 +111,11 @@ class Cia402Drives(DriveGroup):
         return self._bus.exchange([cia402.QUICK_STOP] * len(self._targets), self._targets)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
-        """Run one cycle with new target positions [counts], and check the states."""
+        """Run one cycle with new target positions [counts], and check the states.
+
+        Raises:
+            StateError: A drive left operation enabled or its mode, or ignores set-points.
+        """
         self._targets = targets
         self._cycle()
         for dof in self._config.all_motors:

@@ -95,7 +95,11 @@ class DriveMonitor:
         return positions
 
     def check_start_positions(self, counts: Sequence[int]) -> None:
-        """Raise the error for a motor outside its travel, before the motors are enabled."""
+        """Raise the error for a motor outside its travel, before the motors are enabled.
+
+        Raises:
+            FollowingError: A motor is outside.
+        """
         for dof, scale in zip(self._config.all_motors, self._scales, strict=True):
             position = scale.to_position(counts[dof])
             if not scale.is_inside(position):

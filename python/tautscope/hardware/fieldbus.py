@@ -34,7 +34,11 @@ def abort_error(name: str, what: object, code: int, text: object) -> SettingRefu
 
 
 def require_waived(config: DrivesConfig, entry: Entry, error: SettingRefusedError) -> None:
-    """Raise the error with its waiver as remedy, unless the object is waived."""
+    """Raise the error with its waiver as remedy, unless the object is waived.
+
+    Raises:
+        SettingRefusedError: The object is not waived.
+    """
     waiver = next((name for name in WAIVERS if name == f"{entry.index:04X}"), None)
     if waiver is None:
         raise error

@@ -25,7 +25,12 @@ def camera_serial_number(config: CameraConfig) -> dict[str, str]:
 
 
 def read_serial_numbers(config: Config) -> dict[str, str]:
-    """The serial numbers of camera and drives of a configuration, where they have one."""
+    """The serial numbers of camera and drives of a configuration, where they have one.
+
+    Raises:
+        ConfigError: The section ``drives`` is missing.
+        DriveError: A drive does not answer.
+    """
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
     with closing(open_group(config.drives)) as group:

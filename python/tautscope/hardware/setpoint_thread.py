@@ -58,7 +58,11 @@ class SetpointThread:
         self._thread = threading.Thread(target=self._run, name="set-points")
 
     def start(self) -> Floats:
-        """Move to the start; the positions reached (n,) [m or rad]."""
+        """Move to the start; the positions reached (n,) [m or rad].
+
+        Raises:
+            TautscopeError: The drives failed; the motors are stopped.
+        """
         self._thread.start()
         with self._condition:
             return self._wait_for_answer()[1]

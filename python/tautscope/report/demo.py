@@ -189,6 +189,9 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     with _uncompensated, fig9.png, fig9.pdf, fig5.png; of the operator motion
     operator_motion.csv, .png and .pdf, film.gif, and trace and frames with _operator_motion and
     _operator_motion_uncompensated; report.html.
+
+    Raises:
+        OutputError: The folder is not empty, or cannot be written.
     """
     # Matplotlib takes half a second to import.
     from tautscope.figure_style import style  # noqa: PLC0415

@@ -52,6 +52,9 @@ def write_overlay(fit: GeometryFit, before: Config, file: Path) -> None:
     """Write a video (Motion JPEG, AVI) of the images with the predicted outlines of the bands.
 
     Orange: with the geometry before; blue: with the fitted one; both at the fitted tip.
+
+    Raises:
+        OutputError: The file cannot be written.
     """
     camera = before.camera
     size = (camera.width, camera.height)

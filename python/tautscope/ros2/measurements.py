@@ -36,7 +36,11 @@ class MeasurementReader:
         self._frame = self._settings.frame
 
     def read(self, message: Any, captured_at: float) -> Measurement | None:
-        """The measurement of a message, of a time of the rig's clock [s]; None if it is all NaN."""
+        """The measurement of a message, of a time of the rig's clock [s]; None if it is all NaN.
+
+        Raises:
+            MessageError: Wrong are the frame, the names, a quaternion, a number or the covariance.
+        """
         topic = self._topic
         if self._settings.type == "JointState":
             values = known_positions(topic, message, self._joints)

@@ -42,6 +42,10 @@ def read_camera_info(path: Path) -> Intrinsics:
     """Read a camera_info file of an unrectified camera, or what `ros2 topic echo` prints of one.
 
     A small skew of a fisheye lens, as OpenCV fits it, is left out.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        FieldError: A value is missing or of the wrong kind, or the distortion model is unknown.
     """
     if not path.is_file():
         raise MissingPathError("camera_info", str(path), "a ROS camera_info file (YAML)")

@@ -116,7 +116,11 @@ class ViewCollector:
         return f"{self.coverage.text()}; " + (f"next: {steps[0]}" if steps else "complete")
 
     def check(self) -> None:
-        """Check that the views suffice; the error says why images were not used, what to show."""
+        """Check that the views suffice.
+
+        Raises:
+            CalibrationError: They do not; it says why images were not used, and what to show.
+        """
         if not (steps := self.coverage.next_steps()):
             return
         reasons = [f"{count} images {reason}" for reason, count in self.rejected.most_common()]

@@ -26,7 +26,11 @@ _CAPTION = (
 def camera_result(
     fit: CameraFit, coverage: Coverage, serial_numbers: Mapping[str, str]
 ) -> CalibrationResult:
-    """The result of a fit; a fisheye lens is converted to the model of the loop."""
+    """The result of a fit; a fisheye lens is converted to the model of the loop.
+
+    Raises:
+        CalibrationError: The lens cannot be converted.
+    """
     camera = fit.intrinsics
     std = dict(zip(("camera.fx", "camera.fy", "camera.cx", "camera.cy"), fit.std, strict=False))
     if camera.model == "pinhole":
@@ -43,7 +47,11 @@ def camera_result(
 
 
 def camera_values(camera: Intrinsics) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Values of the section ``camera``, and notes on what they do not represent."""
+    """Values of the section ``camera``, and notes on what they do not represent.
+
+    Raises:
+        CalibrationError: The lens cannot be converted.
+    """
     converted, error = to_loop_model(camera)
     names = ("width", "height", "fx", "fy", "cx", "cy", "distortion")
     found = (*camera.size, *converted.focal, *converted.centre, converted.distortion)

@@ -127,7 +127,11 @@ class Recorder(ImageRecorder):
         self._reasons = Counter[str]()
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
-        """Search the bands in an image, and keep its features and its pixels around the bands."""
+        """Search the bands in an image, and keep its features and its pixels around the bands.
+
+        Raises:
+            FrameError: The image is not what the configured camera gives.
+        """
         self.used(captured_at)
         detection = self._detector.detect(image)
         if not detection.valid:

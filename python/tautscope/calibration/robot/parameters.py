@@ -37,6 +37,9 @@ def fitted(
     The zeros of an insertion along and a rotation about the axis of "two_planes" are those of the
     motors: they could not be told from the pose of the base. A name to keep has to be one of them,
     but "kinematics", of which a robot may have nothing.
+
+    Raises:
+        FieldError: `keep` names none, and is not "kinematics", of which a robot may have nothing.
     """
     kinds = {type(each) for each in measurements}
     poses = [each for each in measurements if isinstance(each, Pose)]

@@ -17,7 +17,12 @@ _WRITE_TIMEOUT = 0.1
 
 
 def open_port(config: DrivesConfig) -> Any:
-    """Open the port, which no other program may have."""
+    """Open the port, which no other program may have.
+
+    Raises:
+        MissingExtraError: The library is not installed.
+        BusError: The port cannot be opened, or another program has it.
+    """
     require_extras("A serial line", ["hardware"])
     import serial  # noqa: PLC0415
 

@@ -61,7 +61,11 @@ class SerialDrives(DriveGroup):
             raise
 
     def status(self, dof: Motor) -> DriveStatus:
-        """Read state, fault and position."""
+        """Read state, fault and position.
+
+        Raises:
+            SettingRefusedError: There is no such axis.
+        """
         limits, at = self._limits(dof), self._at[dof]
         status = self._ask(Request.READ)
         fault, state = status.faults[at], _state(status.state)

@@ -41,7 +41,11 @@ class Servo:
         return self._ask(self._line.read, self.id, register)[0]
 
     def write(self, register: Register, value: int) -> None:
-        """Write a register; it is not read back."""
+        """Write a register; it is not read back.
+
+        Raises:
+            SettingRefusedError: It refused the value.
+        """
         self._ask(self._line.write, self.id, register, value)
 
     def status(self) -> DriveStatus:

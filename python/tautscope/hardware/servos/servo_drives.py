@@ -22,7 +22,12 @@ _WATCHDOG_UNIT = 0.02
 
 
 class ServoDrives(DriveGroup):
-    """Servos on a serial line."""
+    """Servos on a serial line.
+
+    Raises:
+        MissingExtraError: The extra ``servo`` is not installed.
+        BusError: The port cannot be opened.
+    """
 
     def __init__(self, config: DrivesConfig) -> None:
         self._family = family = FAMILIES[config.protocol]
@@ -83,7 +88,13 @@ class ServoDrives(DriveGroup):
         return self.exchange(self._goals)
 
     def exchange(self, targets: list[int]) -> list[Feedback]:
-        """Send the set-points, read the positions, check the faults."""
+        """Send the set-points, read the positions, check the faults.
+
+        Raises:
+            StateError: More than `heartbeat_timeout` passed since the last set-point.
+            EmergencyError: A servo reports a fault.
+            BusError: The port is lost.
+        """
         self._check_pause(f"servos on {self._config.channel}")
         self._goals = targets
         with suppress(NoAnswerError):  # lost like a set-point on its way; `_receive` counts silence
