@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::blur::BlurFitter;
 use crate::error::Error;
 use crate::frame_search::{Found, FrameSearch, Memory};
-use crate::recognition::{BandPredictor, BlobPostures, PostureTable, Recognition};
+use crate::recognition::{BandPredictor, PostureTable, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
 use crate::settings::Settings;
 
@@ -50,8 +49,7 @@ impl Detector {
             postures: Arc::default(),
             memory: Memory {
                 scanner: Scanner::new(&discriminants, smoothing, minimum_area),
-                blobs: BlobPostures::default(),
-                blur: BlurFitter::default(),
+                ..Memory::default()
             },
         })
     }

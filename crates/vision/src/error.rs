@@ -25,12 +25,8 @@ impl Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            field,
-            value,
-            allowed,
-        } = self;
-        write!(formatter, "{field}: got {value}, expected {allowed}")
+        let (field, value) = (self.field, &self.value);
+        write!(formatter, "{field}: got {value}, expected {}", self.allowed)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::blur::{BlurFit, BlurFitter};
 use crate::recognition::{
     BLOBS, BandPrediction, BandPredictor, BlobPostures, LEAST_CONTRAST, OutlineSearch,
-    PostureTable, Recognition, section_contrast,
+    PostureTable, Recognition,
 };
 use crate::scan::{Frame, Regions, Scanner, Window};
 use crate::settings::Settings;
@@ -16,11 +16,8 @@ const LEAST_EDGES: f64 = 1.0;
 const CLEAR_COVERAGE: f64 = 0.5;
 const CLEAR_INSIDE: f64 = 0.9;
 
-/// Standard deviation of the positions whose posture the section is drawn in (px).
-const SECTION_STD: [f64; 4] = [0.5; 4];
-
 /// What a detector keeps between frames: memory, but no information.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Memory {
     /// Regions and runs of the last scan.
     pub scanner: Scanner,
@@ -33,9 +30,7 @@ pub struct Memory {
 /// A result, and the regions that it is based on.
 #[derive(Clone, Copy)]
 pub struct Found {
-    /// The bands.
     pub bands: Recognition,
-    /// The regions.
     pub regions: Regions,
 }
 
@@ -56,22 +51,18 @@ impl Found {
 
 /// Detection in one frame.
 pub struct FrameSearch<'a, F, P> {
-    /// The frame.
     pub frame: &'a F,
-    /// Prediction of the bands.
     pub predictor: &'a P,
     /// Settings for this kind of prediction.
     pub settings: &'a Settings,
     /// Postures that cover the workspace.
     pub postures: &'a PostureTable,
-    /// Memory.
     pub memory: &'a mut Memory,
 }
 
 impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     /// Recognises both bands in the whole frame if the trained discriminant shows them clearly.
     pub fn run_clear(mut self) -> Option<Found> {
-        self.memory.blobs = [None; BLOBS];
         let found = self.by_discriminant(Window::whole(self.frame), 0);
         let is_clear = found.is_complete()
             && (found.bands.scores.iter())
@@ -82,24 +73,21 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     /// Recognises the bands: in the window around the prediction, or without one in the whole frame, and again near what was
     /// found there.
     pub fn run(mut self) -> Found {
-        let whole = Window::whole(self.frame);
-        if self.predictor.is_located() {
-            let near = self.window();
-            let found = self.by_edges(near.map_or(whole, |(_, window)| window));
-            return match near {
-                // Intensity is less reliable than edges: it is used only near a known position.
-                Some((prior, window)) if !found.bands.is_clear(self.settings) => {
-                    self.by_intensity(window, &[found.bands.centroids(), prior.features], &found)
-                }
-                _ => found,
-            };
-        }
+        let is_located = self.predictor.is_located();
+        let near = is_located.then(|| self.window()).flatten();
         self.memory.blobs = [None; BLOBS];
-        let found = self.by_edges(whole);
+        let whole = Window::whole(self.frame);
+        let found = self.by_edges(near.map_or(whole, |(_, window)| window));
         if found.bands.is_clear(self.settings) {
-            found
-        } else {
-            self.again(&found)
+            return found;
+        }
+        match near {
+            // Intensity is less reliable than edges: it is used only near a known position.
+            Some((prior, window)) => {
+                self.by_intensity(window, &[found.bands.centroids(), prior.features], &found)
+            }
+            None if is_located => found,
+            None => self.again(&found),
         }
     }
 
@@ -208,15 +196,10 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         self.memory.scanner.find(self.frame, window, discriminant);
         let regions = self.memory.scanner.regions;
         let mut blobs = self.memory.blobs;
-        let bands = self.outlines().recognise(regions.as_slice(), &mut blobs);
+        let mut bands = self.outlines().recognise(regions.as_slice(), &mut blobs);
+        bands.discriminant = discriminant;
         self.memory.blobs = blobs;
-        Found {
-            bands: Recognition {
-                discriminant,
-                ..bands
-            },
-            regions,
-        }
+        Found { bands, regions }
     }
 
     /// The best of a result that is not clear, the first accepted fit of the intensity from one of the positions, and the edges
@@ -253,15 +236,13 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     }
 
     fn is_accepted(&self, fit: &BlurFit) -> bool {
-        fit.is_accepted(self.settings)
-            && fit.is_inside(&self.memory.scanner.map, self.settings)
+        fit.is_accepted(&self.memory.scanner.map, self.settings)
             && (!self.settings.is_unlocated || self.contrast(fit.features) > LEAST_CONTRAST)
     }
 
-    /// See [`section_contrast`], in the posture at these features (px).
     fn contrast(&self, features: [f64; 4]) -> f64 {
-        let section = self.predictor.section(features, SECTION_STD);
-        section_contrast(self.frame, &section).unwrap_or_default()
+        let contrast = self.outlines().section_contrast(features);
+        contrast.unwrap_or_default()
     }
 
     fn outlines(&self) -> OutlineSearch<'_, F, P> {

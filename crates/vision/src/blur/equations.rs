@@ -14,26 +14,6 @@ pub const BACKGROUND: usize = 6;
 /// Index of the step of sigma.
 pub const SIGMA: usize = 7;
 
-/// Model of the errors of a sample.
-pub struct NoiseModel {
-    /// Variance of the sensor noise (grey levels squared).
-    pub sensor_variance: f64,
-    /// Number of neighbouring samples whose other errors are the same.
-    pub correlated_samples: f64,
-    /// Standard deviation of a band's brightness (grey levels).
-    pub band: f64,
-    /// Standard deviation of the tissue's colour, relative to its redness.
-    pub tissue: f64,
-}
-
-impl NoiseModel {
-    /// Inverse variance of a sample of this redness (grey levels).
-    fn weight(&self, redness: f64) -> f64 {
-        let correlated = self.band.powi(2) + (self.tissue * redness).powi(2);
-        1.0 / (self.sensor_variance + self.correlated_samples * correlated).max(1.0)
-    }
-}
-
 /// Residuals of the intensity fit.
 pub struct Residuals {
     /// Share of the variance that is explained, sensor noise excluded.
@@ -45,14 +25,14 @@ pub struct Residuals {
 }
 
 /// The matrix and the right-hand side of the normal equations over all samples but those at the border of the patch;
-/// `moved` are the masks where each coordinate is larger by [`DIFFERENCE`].
+/// `moved` are the masks where each coordinate is larger by [`DIFFERENCE`], `weight` is the inverse variance of a sample by its
+/// redness (grey levels).
 pub fn normal_equations(
     patch: &Patch,
-    masks: &[Mask; 2],
-    moved: &[[Mask; 2]; 4],
+    [moved @ .., masks]: &[[Mask; 2]; 5],
     brightness: [f64; 2],
     sigma: f64,
-    noise: &NoiseModel,
+    weight: impl Fn(f64) -> f64,
 ) -> (Square<UNKNOWNS>, [f64; UNKNOWNS]) {
     let columns = patch.columns;
     let rows = patch.green.len() / columns.max(1);
@@ -82,7 +62,7 @@ pub fn normal_equations(
                         / (step * step);
             }
             let green = value(&patch.green, at);
-            let weight = noise.weight(patch.redness(at));
+            let weight = weight(patch.redness(at));
             for (index, own) in row.iter().enumerate() {
                 let weighted = weight * own;
                 right_side[index] += weighted * green;
@@ -114,12 +94,8 @@ pub fn residuals(
     let (mut tissue_square, mut fourth) = (0.0, 0.0);
     let samples = patch.green.iter().zip(&a.coverage).zip(&b.coverage);
     for (at, ((green, a), b)) in samples.enumerate() {
-        let tissue = patch.tissue(at);
-        let tissue: f64 = tissue
-            .iter()
-            .zip(&solution[SIGMA + 1..])
-            .map(|(value, by)| value * by)
-            .sum();
+        let tissue = patch.tissue(at).into_iter().zip(&solution[SIGMA + 1..]);
+        let tissue: f64 = tissue.map(|(value, by)| value * by).sum();
         let green = f64::from(*green) - tissue - solution[BACKGROUND];
         let model = brightness[0] * f64::from(*a) + brightness[1] * f64::from(*b);
         let red = patch.redness(at).powi(2);

@@ -27,8 +27,10 @@ pub struct BlurFit {
 }
 
 impl BlurFit {
-    /// Whether this is the intensity of two bands, at well-determined positions.
-    pub fn is_accepted(&self, settings: &Settings) -> bool {
+    /// Whether this is the intensity of two bands, at well-determined positions, with enough of each inside the image.
+    pub fn is_accepted(&self, map: &RunMap, settings: &Settings) -> bool {
+        let is_inside =
+            |own: &Outline| own.count(map, own).pixels >= settings.least_inside * own.area;
         let limits = &settings.blur;
         let [a, b] = self.brightness;
         let (darker, brighter) = (a.min(b), a.max(b));
@@ -39,15 +41,7 @@ impl BlurFit {
             && (0..4).all(|index| {
                 self.covariance[index][index] <= limits.largest_deviation * limits.largest_deviation
             })
-    }
-
-    /// Whether enough of each band is inside the image.
-    pub fn is_inside(&self, map: &RunMap, settings: &Settings) -> bool {
-        let [a, b] = &self.outlines;
-        let is_inside = |own: &Outline, other: &Outline| {
-            own.count(map, other).pixels >= settings.least_inside * own.area
-        };
-        is_inside(a, b) && is_inside(b, a)
+            && self.outlines.iter().all(is_inside)
     }
 
     /// The result: the explained share takes the place of the edge share, and sigma that of the growth.

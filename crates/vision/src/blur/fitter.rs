@@ -2,14 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::equations::{
-    BACKGROUND, DIFFERENCE, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals,
-};
+use super::equations::{BACKGROUND, DIFFERENCE, SIGMA, UNKNOWNS, normal_equations, residuals};
 use super::fit::BlurFit;
 use super::mask::Mask;
 use super::patch::Patch;
 use crate::math::{Square, apply, difference, floor, inverse, quadratic};
-use crate::recognition::{BandPrediction, BandPredictor, Outline};
+use crate::recognition::{BandPrediction, BandPredictor, Outline, extent};
 use crate::scan::Frame;
 use crate::settings::Settings;
 
@@ -46,9 +44,8 @@ const LEAST_SIDE: usize = 8;
 #[derive(Clone, Debug, Default)]
 pub struct BlurFitter {
     patch: Patch,
-    masks: [Mask; 2],
-    /// The masks where each coordinate is larger by [`DIFFERENCE`].
-    moved: [[Mask; 2]; 4],
+    /// The masks where each coordinate is larger by [`DIFFERENCE`], and at the position itself.
+    masks: [[Mask; 2]; 5],
     buffer: Mask,
 }
 
@@ -74,35 +71,29 @@ impl BlurFitter {
     ) -> Option<BlurFit> {
         let settings = &all_settings.blur;
         let mut position = start;
-        let (_, mut outlines) = drawn(predictor, position, START_STD)?;
-        let mut sensor_variance = self.read(frame, &outlines, settings.margin, COARSE)?;
+        let mut prediction = drawn(predictor, position, START_STD)?;
+        let mut sensor_variance =
+            self.read(frame, &prediction.outlines, settings.margin, COARSE)?;
         let (mut brightness, mut sigma) = ([0.0; 2], settings.sigma);
         let mut tissue_unevenness = TISSUE_UNEVENNESS;
         let mut result = None;
         for step in 0..if is_trial { TRIAL_STEPS + 1 } else { STEPS } {
             if step == STEPS / 2 {
-                sensor_variance = self.read(frame, &outlines, settings.margin, 1)?;
+                sensor_variance = self.read(frame, &prediction.outlines, settings.margin, 1)?;
             }
             let scaled_sigma = sigma / self.patch.step;
-            let prediction;
-            (prediction, outlines) = self.draw_masks(predictor, position, scaled_sigma)?;
+            prediction = self.draw_masks(predictor, position, scaled_sigma)?;
+            let (patch, masks) = (&self.patch, &self.masks);
             let prior = inverse(correlated(&prediction, all_settings))?;
             let mean = f64::midpoint(brightness[0], brightness[1]);
-            let noise = NoiseModel {
-                sensor_variance,
-                // Errors other than sensor noise are alike in neighbours: the area of the kernel counts as one sample.
-                correlated_samples: 2.0 * PI * scaled_sigma.max(1.0).powi(2),
-                band: settings.unevenness * mean,
-                tissue: tissue_unevenness,
+            // Errors other than sensor noise are alike in neighbours: the area of the kernel counts as one sample.
+            let area = 2.0 * PI * scaled_sigma.max(1.0).powi(2);
+            let band = (settings.unevenness * mean).powi(2);
+            let weight = |redness: f64| {
+                let alike = band + (tissue_unevenness * redness).powi(2);
+                1.0 / (sensor_variance + area * alike).max(1.0)
             };
-            let (mut normal, mut right) = normal_equations(
-                &self.patch,
-                &self.masks,
-                &self.moved,
-                brightness,
-                sigma,
-                &noise,
-            );
+            let (mut normal, mut right) = normal_equations(patch, masks, brightness, sigma, weight);
             let offset = difference(prediction.features, position);
             for (row, pull) in apply(&prior, offset).into_iter().enumerate() {
                 right[row] += pull;
@@ -134,13 +125,7 @@ impl BlurFitter {
             brightness =
                 [found[4], found[5]].map(|value: f64| value.clamp(0.0, LARGEST_BRIGHTNESS));
             sigma = sigma.clamp(SIGMA_BOUNDS[0], SIGMA_BOUNDS[1]);
-            let left = residuals(
-                &self.patch,
-                &self.masks,
-                &found,
-                brightness,
-                sensor_variance,
-            );
+            let left = residuals(patch, &masks[4], &found, brightness, sensor_variance);
             tissue_unevenness = left.tissue_unevenness.max(settings.unevenness);
             let offset = difference(prediction.features, position);
             let model_variance = settings.model_deviation * settings.model_deviation;
@@ -156,7 +141,7 @@ impl BlurFitter {
                 residual: left.std,
                 sigma,
                 mahalanobis_squared: quadratic(&prior, offset),
-                outlines,
+                outlines: prediction.outlines,
             });
             if step == TRIAL_STEPS && left.explained < LEAST_TRIAL_EXPLAINED {
                 return None;
@@ -169,35 +154,29 @@ impl BlurFitter {
     }
 
     /// Draws the blurred masks of the outlines at a position, and where each coordinate is larger by [`DIFFERENCE`], without
-    /// what the section hides. Returns the prediction in the posture there, and the outlines.
+    /// what the section hides. Returns the prediction at the position.
     fn draw_masks(
         &mut self,
         predictor: &impl BandPredictor,
         position: [f64; 4],
         sigma: f64,
-    ) -> Option<(BandPrediction, [Outline; 2])> {
-        let Self {
-            patch,
-            masks,
-            moved,
-            buffer,
-        } = self;
+    ) -> Option<BandPrediction> {
         let section = predictor.section(position, [STEP_STD; 4]);
-        let mut draw = |masks: &mut [Mask; 2], outlines: &[Outline; 2]| {
-            for (band, (mask, outline)) in masks.iter_mut().zip(outlines).enumerate() {
-                mask.draw(outline, patch);
-                mask.hide(&section, band, patch);
-                mask.blur(sigma, patch.columns, buffer);
-            }
-        };
-        for (index, masks) in moved.iter_mut().enumerate() {
+        let mut last = None;
+        for (index, masks) in self.masks.iter_mut().enumerate() {
             let mut place = position;
-            place[index] += DIFFERENCE;
-            draw(masks, &drawn(predictor, place, STEP_STD)?.1);
+            if let Some(coordinate) = place.get_mut(index) {
+                *coordinate += DIFFERENCE;
+            }
+            let prediction = drawn(predictor, place, STEP_STD)?;
+            for (band, (mask, outline)) in masks.iter_mut().zip(&prediction.outlines).enumerate() {
+                mask.draw(outline, &self.patch);
+                mask.hide(&section, band, &self.patch);
+                mask.blur(sigma, self.patch.columns, &mut self.buffer);
+            }
+            last = Some(prediction);
         }
-        let (prediction, outlines) = drawn(predictor, position, STEP_STD)?;
-        draw(masks, &outlines);
-        Some((prediction, outlines))
+        last
     }
 
     /// Reads the pixels around the outlines; returns the variance of the sensor noise (grey levels squared).
@@ -208,12 +187,9 @@ impl BlurFitter {
         margin: f64,
         step: usize,
     ) -> Option<f64> {
-        let corners = || outlines.iter().flat_map(|outline| &outline.corners);
         let range = |axis: usize, size: usize| {
-            let values = || corners().map(|corner| corner[axis]);
-            let first = values().fold(f64::INFINITY, f64::min) - margin;
-            let last = values().fold(f64::NEG_INFINITY, f64::max) + margin;
-            floor(first).min(size)..floor(last + 1.0).min(size)
+            let [first, last] = extent(outlines, axis);
+            floor(first - margin).min(size)..floor(last + margin + 1.0).min(size)
         };
         let (columns, rows) = (range(0, frame.width()), range(1, frame.height()));
         if columns.len() < LEAST_SIDE || rows.len() < LEAST_SIDE {
@@ -226,16 +202,11 @@ impl BlurFitter {
     }
 }
 
-/// The prediction with outlines in the posture that best explains a position (px, standard deviation `std`), and these
-/// outlines moved there.
-fn drawn(
-    predictor: &impl BandPredictor,
-    position: [f64; 4],
-    std: f64,
-) -> Option<(BandPrediction, [Outline; 2])> {
-    let prediction = predictor.predict(position, [std; 4])?;
-    let outlines = prediction.outlines_at(position);
-    Some((prediction, outlines))
+/// The prediction with outlines in the posture that best explains a position (px, standard deviation `std`), moved there.
+fn drawn(predictor: &impl BandPredictor, position: [f64; 4], std: f64) -> Option<BandPrediction> {
+    let mut prediction = predictor.predict(position, [std; 4])?;
+    prediction.outlines = prediction.outlines_at(position);
+    Some(prediction)
 }
 
 /// The covariance of the predicted positions, with the model's errors of both bands correlated.

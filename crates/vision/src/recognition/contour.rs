@@ -80,33 +80,21 @@ impl Contour {
     }
 }
 
-/// An edge of the marker pixels on a normal of an outline.
-pub enum Edge {
-    /// The image does not show it.
-    Unknown,
-    /// There is none within reach.
-    Missing,
-    /// It is this far outwards (px).
-    At(f64),
-}
-
-/// Finds the edge of the marker pixels along `normal` within `reach` (px) of `at`.
-pub fn find_edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Edge {
+/// How far outwards the edge of the marker pixels is along `normal` from `at` (px), infinity if there is none within `reach`;
+/// None where the image does not show it.
+pub fn find_edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Option<f64> {
     let (width, height) = map.size();
     let is_within = |[u, v]: [f64; 2]| {
         (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
     };
     if !is_within(at) {
-        return Edge::Unknown;
+        return None;
     }
-    let offset = crossing(map, at, normal, reach);
+    let Some(offset) = crossing(map, at, normal, reach) else {
+        return Some(f64::INFINITY);
+    };
     // At the border of the image the colour ends whether the band does or not.
-    let end = offset.unwrap_or_default();
-    if is_within([at[0] + end * normal[0], at[1] + end * normal[1]]) {
-        offset.map_or(Edge::Missing, Edge::At)
-    } else {
-        Edge::Unknown
-    }
+    is_within([at[0] + offset * normal[0], at[1] + offset * normal[1]]).then_some(offset)
 }
 
 /// Distance from `at` along `normal` to the edge, within `reach` (px), in steps of half a pixel that are halved once.

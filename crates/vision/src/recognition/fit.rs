@@ -1,8 +1,9 @@
 //! Robust fit of both outlines to the edges of the marker pixels.
 
-use super::contour::{Contour, Edge, find_edge};
+use super::contour::{Contour, find_edge};
+use super::outline::Outline;
 use super::prediction::BandPrediction;
-use crate::math::{Square, apply, difference, inverse};
+use crate::math::{Square, apply, difference, inverse, quadratic};
 use crate::scan::RunMap;
 use crate::settings::FitSettings;
 
@@ -20,24 +21,17 @@ pub struct Fit {
     pub features: [f64; 4],
     /// Their covariance (4, 4) (px^2).
     pub covariance: Square<4>,
-    /// Growth of each outline.
-    pub growth: [Growth; 2],
+    /// The predicted outlines at the centroids, without growth.
+    pub outlines: [Outline; 2],
+    /// Growth of the outlines by blur and threshold (px): of the rims of A, its sides, those of B. The rims, beyond which
+    /// there is the tip, and the sides, beyond which there is tissue, move differently.
+    pub growth: [f64; 4],
     /// Share of each outline in the image at which an edge was found within the tolerance.
     pub edges: [f64; 2],
     /// The same for the rims alone; 1 if less than a few samples of them are in the image.
     pub rims: [f64; 2],
     /// Squared Mahalanobis distance from the predicted features, 4 degrees of freedom.
     pub mahalanobis_squared: f64,
-}
-
-/// Growth of an outline by blur and threshold (px): the rims, beyond which there is the tip, and the sides, beyond
-/// which there is tissue, move differently.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Growth {
-    /// Along the axis.
-    pub rims: f64,
-    /// Across it.
-    pub sides: f64,
 }
 
 /// Fits the predicted outlines to the edges of the marker pixels, from centroids `start` on.
@@ -85,24 +79,20 @@ pub fn fit(
         }
         // By part: rims and sides of A, rims and sides of B.
         let (mut edges, mut visible) = ([0.0; 4], [0.0; 4]);
-        for (band, contour) in contours
-            .iter()
-            .enumerate()
-            .filter(|(band, _)| is_used[*band])
-        {
+        for (band, contour) in contours.iter().enumerate() {
+            if !is_used[band] {
+                continue;
+            }
             let [u, v] = [position[2 * band], position[2 * band + 1]];
             for sample in contour.samples() {
                 let part = 2 * band + usize::from(sample.is_side);
                 let tolerance = settings.edge_tolerance * width;
                 let reach = (tolerance + growth[part].abs()).min(contour.reach);
                 let at = [u + sample.offset[0], v + sample.offset[1]];
-                let offset = match find_edge(map, at, sample.normal, reach) {
-                    Edge::Unknown => continue,
-                    Edge::Missing => None,
-                    Edge::At(offset) => Some(offset),
+                let Some(offset) = find_edge(map, at, sample.normal, reach) else {
+                    continue;
                 };
                 visible[part] += 1.0;
-                let Some(offset) = offset else { continue };
                 let share = (offset - growth[part]) / tolerance;
                 if share.abs() >= 1.0 {
                     continue;
@@ -126,15 +116,11 @@ pub fn fit(
         for (value, step) in position.iter_mut().zip([du_a, dv_a, du_b, dv_b]) {
             *value += step;
         }
-        let away = difference(prediction.features, position);
-        let pull = apply(&prior, away);
         result = Some(Fit {
             features: position,
+            outlines: prediction.outlines_at(position),
             covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
-            growth: [0, 2].map(|part| Growth {
-                rims: growth[part],
-                sides: growth[part + 1],
-            }),
+            growth,
             edges: [0, 2].map(|part| {
                 (edges[part] + edges[part + 1]) / f64::max(visible[part] + visible[part + 1], 1.0)
             }),
@@ -142,7 +128,7 @@ pub fn fit(
                 count if count < LEAST_RIM_SAMPLES => 1.0,
                 count => edges[part] / count,
             }),
-            mahalanobis_squared: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
+            mahalanobis_squared: quadratic(&prior, difference(prediction.features, position)),
         });
     }
     result

@@ -13,6 +13,7 @@ mod starts;
 mod surroundings;
 
 pub use outcome::Recognition;
+pub(crate) use outline::extent;
 pub use outline::{OUTLINE_CORNERS, Outline};
 pub use posture_table::PostureTable;
 pub(crate) use posture_table::{BLOBS, BlobPostures};
@@ -20,4 +21,4 @@ pub use prediction::{BandPrediction, BandPredictor, SECTION_DISCS, SectionDisc};
 pub use rejection::Rejection;
 pub use score::BandScore;
 pub(crate) use search::OutlineSearch;
-pub(crate) use surroundings::{LEAST_CONTRAST, section_contrast};
+pub(crate) use surroundings::LEAST_CONTRAST;

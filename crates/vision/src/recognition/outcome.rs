@@ -1,13 +1,10 @@
 //! Result of the recognition of both bands.
 
 use super::fit::Fit;
-use super::outline::Outline;
-use super::prediction::{BandPrediction, SECTION_DISCS, SectionDisc};
 use super::rejection::Rejection;
 use super::score::{BandScore, score};
-use super::surroundings::{LEAST_CONTRAST, contrast_between, section_contrast};
 use crate::math::is_near;
-use crate::scan::{Frame, RunMap};
+use crate::scan::RunMap;
 use crate::settings::Settings;
 
 /// Recognised bands, or why they are not.
@@ -33,13 +30,8 @@ const SAME_PLACE: f64 = 2.0;
 pub const UNKNOWN: [f64; 4] = [f64::NAN; 4];
 
 impl Recognition {
-    pub(crate) fn of(
-        prediction: &BandPrediction,
-        fit: &Fit,
-        map: &RunMap,
-        settings: &Settings,
-    ) -> Self {
-        let (scores, rejections) = score(prediction, fit, map, settings);
+    pub(crate) fn of(fit: &Fit, map: &RunMap, settings: &Settings) -> Self {
+        let (scores, rejections) = score(fit, map, settings);
         let mut result = Self {
             features: fit.features,
             covariance: inflated(&fit.covariance, fit.edges, settings),
@@ -65,40 +57,9 @@ impl Recognition {
 
     /// Whether it is so clear that no other candidate in the frame can be better.
     pub(crate) fn is_certain(&self, settings: &Settings) -> bool {
-        let least = if settings.is_unlocated {
-            settings.unlocated.certain_edges
-        } else {
-            0.0
-        };
-        self.is_clear(settings) && self.scores.iter().all(|score| score.edges >= least)
-    }
-
-    /// Rejects bands with no instrument between them or next to them, and those whose surroundings do not show it unless they
-    /// are certain.
-    pub(crate) fn require_instrument(
-        &mut self,
-        frame: &impl Frame,
-        outlines: &[Outline; 2],
-        section: &[Option<SectionDisc>; SECTION_DISCS],
-        settings: &Settings,
-    ) {
-        if self.rejections != [None; 2] {
-            return;
-        }
-        let parts = [
-            contrast_between(frame, outlines),
-            section_contrast(frame, section),
-        ];
-        let mut known = parts.into_iter().flatten();
-        let is_accepted = if parts == [None; 2] {
-            self.is_certain(settings)
-        } else {
-            known.all(|contrast| contrast > LEAST_CONTRAST)
-        };
-        if !is_accepted {
-            self.rejections = [Some(Rejection::NoInstrument); 2];
-            self.erase_rejected();
-        }
+        let least = settings.unlocated.certain_edges;
+        let has_edges = self.scores.iter().all(|score| score.edges >= least);
+        self.is_clear(settings) && (has_edges || !settings.is_unlocated)
     }
 
     /// Sets the features of rejected bands to NaN.

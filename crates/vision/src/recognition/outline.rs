@@ -117,10 +117,9 @@ impl Outline {
     /// Calls `visit(v, first, last)` with the first and last pixel of each part of a row inside the outline and the image.
     fn each_span(&self, map: &RunMap, mut visit: impl FnMut(f64, f64, f64)) {
         let (width, height) = map.size();
-        let rows = || self.corners.iter().map(|[_, v]| *v);
-        let mut v = rows().fold(f64::INFINITY, f64::min).ceil().max(0.0);
-        let last = rows().fold(f64::NEG_INFINITY, f64::max).min(height - 1.0);
-        while v <= last {
+        let [first, last] = extent(std::slice::from_ref(self), 1);
+        let mut v = first.ceil().max(0.0);
+        while v <= last.min(height - 1.0) {
             self.each_span_of_row(v, width, |from, to| visit(v, from, to));
             v += 1.0;
         }
@@ -134,6 +133,14 @@ impl Outline {
             }
         });
     }
+}
+
+/// The least and the largest coordinate of outlines along an axis, u or v (px).
+pub(crate) fn extent(outlines: &[Outline], axis: usize) -> [f64; 2] {
+    let corners = outlines.iter().flat_map(|outline| &outline.corners);
+    corners.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
+        [least.min(at[axis]), most.max(at[axis])]
+    })
 }
 
 /// See [`Outline::count`].

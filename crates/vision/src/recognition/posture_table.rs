@@ -1,6 +1,6 @@
 //! Postures of the whole workspace, compared with the regions of an image where nothing else predicts the bands.
 
-use super::outline::Outline;
+use super::outline::{Outline, extent};
 use super::starts::{Candidate, Ranking, TRIALS, rank};
 use crate::math::{is_near, real, real_sum, single};
 use crate::scan::Region;
@@ -66,17 +66,13 @@ impl Posture {
 impl Shape {
     fn of(outlines: &[Outline]) -> Self {
         let area: f64 = outlines.iter().map(|outline| outline.area).sum();
-        let corners = || outlines.iter().flat_map(|outline| outline.corners);
         let side = |axis: usize| {
-            let values = || corners().map(|corner| corner[axis]);
-            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+            let [first, last] = extent(outlines, axis);
+            last - first
         };
         let centroid = |axis: usize| {
-            let sum: f64 = outlines
-                .iter()
-                .map(|outline| outline.area * outline.centroid[axis])
-                .sum();
-            sum / area
+            let moments = outlines.iter().map(|one| one.area * one.centroid[axis]);
+            moments.sum::<f64>() / area
         };
         Self {
             centroid: [0, 1].map(|axis| single(centroid(axis))),

@@ -1,6 +1,6 @@
 //! Predicted position and outline of both bands.
 
-use super::outline::Outline;
+use super::outline::{Outline, extent};
 use crate::math::{floor, points, real};
 use crate::scan::{Frame, Window};
 
@@ -26,23 +26,17 @@ impl BandPrediction {
     ///
     /// None if it is more than a quarter of the frame, because reading the whole frame then takes little longer, or outside.
     pub(crate) fn window(&self, frame: &impl Frame, margin: f64) -> Option<Window> {
-        let [size_u, size_v] = [frame.width(), frame.height()].map(real);
-        let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];
-        for (band, outline) in self.outlines.iter().enumerate() {
-            let reach = |axis: usize| {
-                let variance = self.covariance[2 * band + axis][2 * band + axis];
-                3.0 * variance.sqrt() + margin
-            };
-            let [reach_u, reach_v] = [0, 1].map(reach);
-            let [shift_u, shift_v] =
-                [0, 1].map(|axis| self.features[2 * band + axis] - outline.centroid[axis]);
-            for [u, v] in outline.corners {
-                left = left.min(u + shift_u - reach_u);
-                right = right.max(u + shift_u + reach_u);
-                top = top.min(v + shift_v - reach_v);
-                bottom = bottom.max(v + shift_v + reach_v);
-            }
-        }
+        let sizes = [frame.width(), frame.height()].map(real);
+        let outlines = self.outlines_at(self.features);
+        let [[left, right], [top, bottom]] = [0, 1].map(|axis| {
+            let bands = outlines.chunks(1).zip([axis, 2 + axis]);
+            bands.fold([sizes[axis], 0.0_f64], |[first, last], (outline, at)| {
+                let reach = 3.0 * self.covariance[at][at].sqrt() + margin;
+                let [least, most] = extent(outline, axis);
+                [first.min(least - reach), last.max(most + reach)]
+            })
+        });
+        let [size_u, size_v] = sizes;
         let pixel = |value: f64, size: f64| floor(value.clamp(0.0, size));
         let window = Window {
             left: pixel(left.floor(), size_u),

@@ -1,7 +1,6 @@
 //! Scores of a fitted outline, and the thresholds they must reach.
 
-use super::fit::{Fit, Growth};
-use super::prediction::BandPrediction;
+use super::fit::Fit;
 use super::rejection::Rejection;
 use crate::math::points;
 use crate::scan::RunMap;
@@ -42,8 +41,8 @@ impl BandScore {
             && self.mahalanobis_squared <= clear.largest_surprise
     }
 
-    /// The first threshold that the band fails.
-    fn rejection(&self, settings: &Settings) -> Option<Rejection> {
+    /// The first threshold that the band fails, with edges at this share of its rims.
+    fn rejection(&self, rims: f64, settings: &Settings) -> Option<Rejection> {
         // A band with few edges must be near its predicted position: the bound falls with the square of their share.
         let shortage = (self.edges / settings.clear.least_edges).min(1.0).powi(2);
         let least_exclusive = settings.least_exclusive * self.coverage;
@@ -56,7 +55,8 @@ impl BandScore {
         } else if self.edges < settings.least_edges {
             Some(Rejection::MissingEdges(self.edges))
         } else if self.mahalanobis_squared <= settings.largest_surprise * shortage {
-            None
+            // The sides alone do not determine the position along them.
+            (rims < settings.least_rims).then_some(Rejection::MissingEdges(rims))
         } else {
             Some(Rejection::Elsewhere(self.mahalanobis_squared.sqrt()))
         }
@@ -65,16 +65,14 @@ impl BandScore {
 
 /// Scores each band of a fit, and rejects those below the thresholds.
 pub fn score(
-    prediction: &BandPrediction,
     fit: &Fit,
     map: &RunMap,
     settings: &Settings,
 ) -> ([BandScore; 2], [Option<Rejection>; 2]) {
     let centroids = points(fit.features);
-    let moved = prediction.outlines_at(fit.features);
     let outlines = [0, 1].map(|band| {
-        let Growth { rims, sides } = fit.growth[band];
-        moved[band].grown(f64::midpoint(rims, sides))
+        let (rims, sides) = (fit.growth[2 * band], fit.growth[2 * band + 1]);
+        fit.outlines[band].grown(f64::midpoint(rims, sides))
     });
     let scores = [0, 1].map(|band| {
         let (own, other) = (&outlines[band], &outlines[1 - band]);
@@ -91,19 +89,13 @@ pub fn score(
             exclusive: (whole.marker - whole.shared) / f64::max(whole.pixels, 1.0),
             spill: marker / ring,
             edges: fit.edges[band],
-            growth: fit.growth[band].rims,
+            growth: fit.growth[2 * band],
             mahalanobis_squared: fit.mahalanobis_squared,
             pixels: whole.marker - whole.shared,
             centroid: centroids[band],
         }
     });
-    let mut rejections = scores.map(|score| score.rejection(settings));
-    for (rejection, rims) in rejections.iter_mut().zip(fit.rims) {
-        // The sides alone do not determine the position along them.
-        if rejection.is_none() && rims < settings.least_rims {
-            *rejection = Some(Rejection::MissingEdges(rims));
-        }
-    }
+    let mut rejections = [0, 1].map(|band| scores[band].rejection(fit.rims[band], settings));
     // Where two bands are too weak on average the weaker one is rejected; the other then has to pass alone.
     let edges = scores.map(|score| score.edges);
     let weaker = usize::from(edges[1] < edges[0]);

@@ -6,6 +6,7 @@ use super::posture_table::{BlobPostures, PostureTable};
 use super::prediction::{BandPrediction, BandPredictor};
 use super::rejection::Rejection;
 use super::starts::{SAME, TRIALS, centroids, likely_pairs, uncut_centroids};
+use super::surroundings::{LEAST_CONTRAST, contrast_between, section_contrast};
 use crate::math::is_near;
 use crate::scan::{Frame, Region, RunMap};
 use crate::settings::Settings;
@@ -15,6 +16,8 @@ const REPEATS: usize = 6;
 const CONVERGED: f64 = 0.1;
 /// Standard deviation of the centroid of a region as a feature (px): part of the band may be hidden.
 const REGION_STD: [f64; 4] = [4.0; 4];
+/// Standard deviation of the positions whose posture the section is drawn in (px).
+const SECTION_STD: [f64; 4] = [0.5; 4];
 /// Least sum of the edge shares of both bands in the coarse fit, without a prediction: it bounds the time.
 const PROMISING_EDGES: f64 = 0.5;
 /// A band found alone must be nearer to its predicted position than to the other's by this squared Mahalanobis distance:
@@ -23,11 +26,9 @@ const AMBIGUITY: f64 = 9.0;
 
 /// Search for both bands near their prediction.
 pub struct OutlineSearch<'a, F, P> {
-    /// The frame.
     pub frame: &'a F,
     /// The marker pixels.
     pub map: &'a RunMap,
-    /// The prediction.
     pub predictor: &'a P,
     /// Thresholds and the settings of the fit.
     pub settings: &'a Settings,
@@ -48,7 +49,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         let mut tried = [UNKNOWN; 2 * TRIALS];
         let starts = self.starts(regions, &prior, blobs).into_iter();
         for (index, observed) in starts.flatten().enumerate() {
-            let Some((_, first)) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
+            let Some(first) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
                 continue;
             };
             // Many pairs lead to the same fit.
@@ -60,7 +61,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
             if !self.predictor.is_located() && first.edges[0] + first.edges[1] < PROMISING_EDGES {
                 continue;
             }
-            let Some(found) = self.refine(first) else {
+            let Some(found) = self.refine(&first) else {
                 continue;
             };
             if best.is_none_or(|other| found.is_better(&other, self.settings)) {
@@ -112,88 +113,81 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
 
     /// Recognises the bands near features `observed` (4,) (px) with standard deviations `std` (4,) (px).
     pub fn recognise_at(&self, observed: [f64; 4], std: [f64; 4]) -> Option<Recognition> {
-        let (_, first) = self.fit(observed, std, [true; 2], COARSE)?;
-        self.refine(first)
+        self.refine(&self.fit(observed, std, [true; 2], COARSE)?)
     }
 
     /// Rejects a band found alone if it is not complete enough, or if the same pixels fit the other band as well.
     fn check_single(&self, mut found: Recognition, band: usize, regions: &[Region]) -> Recognition {
-        let score = found.scores[band];
+        let (score, other) = (found.scores[band], 1 - band);
         let least = self.settings.least_edges_alone;
+        let [u, v] = score.centroid;
+        let distance = |[ru, rv]: &[f64; 2]| (ru - u).hypot(rv - v);
+        let centroids = regions.iter().map(Region::centroid);
+        let nearest = centroids.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let fits_other = |place: [f64; 2]| {
+            let mut observed = UNKNOWN;
+            observed[2 * other..2 * other + 2].copy_from_slice(&place);
+            let found = self.recognise_at(observed, REGION_STD);
+            found.is_some_and(|found| {
+                found.rejections[other].is_none()
+                    && found.scores[other].mahalanobis_squared
+                        < score.mahalanobis_squared + AMBIGUITY
+            })
+        };
         if score.edges < least || score.coverage < 0.75 * least {
             found.rejections[band] = Some(Rejection::MissingEdges(score.edges));
-            found.erase_rejected();
-            return found;
-        }
-        let [u, v] = score.centroid;
-        let distance = |region: &Region| {
-            let [ru, rv] = region.centroid();
-            (ru - u).hypot(rv - v)
-        };
-        let nearest = (0..regions.len())
-            .min_by(|a, b| distance(&regions[*a]).total_cmp(&distance(&regions[*b])));
-        let mut pair = [None; 2];
-        pair[1 - band] = nearest;
-        let mut here = UNKNOWN;
-        [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
-        let starts = [here, centroids((pair, UNKNOWN), regions)];
-        let is_ambiguous = starts.iter().any(|observed| {
-            self.recognise_at(*observed, REGION_STD)
-                .is_some_and(|other| {
-                    other.rejections[1 - band].is_none()
-                        && other.scores[1 - band].mahalanobis_squared
-                            < score.mahalanobis_squared + AMBIGUITY
-                })
-        });
-        if is_ambiguous {
+        } else if fits_other([u, v]) || nearest.is_some_and(fits_other) {
             found.rejections[band] = Some(Rejection::Ambiguous);
-            found.erase_rejected();
         }
+        found.erase_rejected();
         found
     }
 
+    /// Whether the image shows an instrument between the bands and next to them; where it does not tell, whether the bands are
+    /// certain.
+    fn has_instrument(&self, fit: &Fit, bands: &Recognition) -> bool {
+        let between = contrast_between(self.frame, &fit.outlines);
+        match [between, self.section_contrast(fit.features)] {
+            [None, None] => bands.is_certain(self.settings),
+            parts => (parts.into_iter().flatten()).all(|contrast| contrast > LEAST_CONTRAST),
+        }
+    }
+
+    /// See [`section_contrast`], in the posture at these features (px).
+    pub fn section_contrast(&self, features: [f64; 4]) -> Option<f64> {
+        let section = self.predictor.section(features, SECTION_STD);
+        section_contrast(self.frame, &section)
+    }
+
     /// Repeats a fit with the outlines of the posture that it implies, until it converges.
-    fn refine(&self, mut found: Fit) -> Option<Recognition> {
-        let mut last = None;
-        for _ in 0..REPEATS {
-            let before = found.features;
-            let Some((prediction, next)) = self.fit(before, fit_std(&found), [true; 2], FINE)
-            else {
-                break;
-            };
-            found = next;
-            last = Some(prediction);
-            let moved = before.iter().zip(found.features);
-            if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < CONVERGED {
+    fn refine(&self, first: &Fit) -> Option<Recognition> {
+        let again = |fit: &Fit| self.fit(fit.features, fit_std(fit), [true; 2], FINE);
+        let (mut before, mut found) = (first.features, again(first)?);
+        for _ in 1..REPEATS {
+            if is_near(&before, &found.features, CONVERGED) {
                 break;
             }
+            let Some(next) = again(&found) else { break };
+            (before, found) = (found.features, next);
         }
-        let prediction = last?;
-        let mut result = Recognition::of(&prediction, &found, self.map, self.settings);
-        if self.settings.is_unlocated {
-            result.require_instrument(
-                self.frame,
-                &prediction.outlines_at(found.features),
-                &self.predictor.section(found.features, [0.5; 4]),
-                self.settings,
-            );
+        let mut result = Recognition::of(&found, self.map, self.settings);
+        if self.settings.is_unlocated
+            && result.rejections == [None; 2]
+            && !self.has_instrument(&found, &result)
+        {
+            result.rejections = [Some(Rejection::NoInstrument); 2];
+            result.erase_rejected();
         }
-        let rejections = result.rejections;
-        let is_used = rejections.map(|rejection| rejection.is_none());
+        let is_used = result.rejections.map(|rejection| rejection.is_none());
         if is_used[0] == is_used[1] {
             return Some(result);
         }
-        // A rejected band must not influence the position of the other.
-        let mut observed = found.features;
-        for band in (0..2).filter(|band| !is_used[*band]) {
-            observed[2 * band..2 * band + 2].fill(f64::NAN);
-        }
-        let (prediction, found) = self.fit(observed, fit_std(&found), is_used, FINE)?;
-        let mut single = Recognition::of(&prediction, &found, self.map, self.settings);
-        for band in (0..2).filter(|band| !is_used[*band]) {
-            single.rejections[band] = rejections[band];
-            single.scores[band] = result.scores[band];
-        }
+        // A rejected band, whose features are NaN, must not influence the position of the other.
+        let alone = self.fit(result.features, fit_std(&found), is_used, FINE)?;
+        let mut single = Recognition::of(&alone, self.map, self.settings);
+        let rejected = usize::from(is_used[0]);
+        single.rejections[rejected] = result.rejections[rejected];
+        single.scores[rejected] = result.scores[rejected];
         single.erase_rejected();
         Some(single)
     }
@@ -205,18 +199,14 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         std: [f64; 4],
         is_used: [bool; 2],
         tolerances: [f64; 3],
-    ) -> Option<(BandPrediction, Fit)> {
+    ) -> Option<Fit> {
         let prediction = self.predictor.predict(observed, std)?;
-        let [[ua, va], [ub, vb]] = prediction.outlines.map(|outline| outline.centroid);
-        let mut start = [ua, va, ub, vb];
-        for (start, observed) in start.iter_mut().zip(observed) {
-            if observed.is_finite() {
-                *start = observed;
-            }
-        }
+        let start = std::array::from_fn(|index| match observed[index] {
+            known if known.is_finite() => known,
+            _ => prediction.outlines[index / 2].centroid[index % 2],
+        });
         let settings = &self.settings.fit;
-        let found = fit(&prediction, start, is_used, tolerances, self.map, settings)?;
-        Some((prediction, found))
+        fit(&prediction, start, is_used, tolerances, self.map, settings)
     }
 }
 

@@ -49,12 +49,9 @@ pub fn rank<T, const N: usize>(
 pub fn likely_pairs(regions: &[Region], prediction: &BandPrediction) -> Ranking<Candidate, TRIALS> {
     let outlines = &prediction.outlines;
     let mut kept = [None; TRIALS];
-    let variance = outlines
-        .each_ref()
-        .map(|outline| (0.35 * outline.radius()).powi(2));
     let mut covariance = prediction.covariance;
     for (index, row) in covariance.iter_mut().enumerate() {
-        row[index] += variance[index / 2];
+        row[index] += (0.35 * outlines[index / 2].radius()).powi(2);
     }
     let both = inverse(covariance).unwrap_or([[0.0; 4]; 4]);
     let single = [0, 2].map(|at| {

@@ -5,13 +5,13 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 
 use super::active_blocks::{ActiveBlocks, BLOCK, STRIP};
-use super::lowpass::{Block, LowPass, replicate_end};
+use super::lowpass::{Block, LowPass, cut, replicate_end};
 use super::projection::Projection;
 use super::row::Row;
 use super::runs::runs_of_bits;
 
 /// Projects and filters the active blocks of rows, and keeps the marker pixels of a strip.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Filter {
     width: usize,
     height: usize,
@@ -27,16 +27,11 @@ impl Filter {
     /// With this many passes of the low-pass.
     pub fn new(passes: usize) -> Self {
         Self {
-            width: 0,
-            height: 0,
-            blocks: 0,
             passes: vec![LowPass::default(); passes],
-            values: [const { Vec::new() }; 2],
-            marker: Vec::new(),
+            ..Self::default()
         }
     }
 
-    /// Number of passes.
     pub fn passes(&self) -> usize {
         self.passes.len()
     }
@@ -94,13 +89,7 @@ impl Filter {
         projection: &Projection,
     ) {
         let columns = blocks.start * BLOCK..self.width.min(blocks.end * BLOCK);
-        let [values, filtered] = self.values.each_mut();
-        let (Some(mut values), Some(mut filtered)) = (
-            values.get_mut(blocks.clone()),
-            filtered.get_mut(blocks.clone()),
-        ) else {
-            return;
-        };
+        let [mut values, mut filtered] = self.values.each_mut().map(|row| cut(row, blocks));
         if let (Some(source), Some(values)) =
             (source, values.as_flattened_mut().get_mut(..columns.len()))
         {
@@ -114,7 +103,7 @@ impl Filter {
         let words = row * self.blocks + blocks.start..row * self.blocks + blocks.end;
         let words = self.marker.get_mut(words).unwrap_or_default();
         for (word, values) in words.iter_mut().zip(&*values) {
-            *word = above(simd, values, projection.threshold());
+            *word = above(simd, values, projection.threshold);
         }
         // Bits beyond the image are no pixels.
         let beyond = words.len() * BLOCK - columns.len();

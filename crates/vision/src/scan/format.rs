@@ -1,7 +1,5 @@
 //! Pixel formats.
 
-use std::ops::Range;
-
 use crate::error::Error;
 
 /// The longest side of a frame (px), so that counts and sums over it are exact.
@@ -105,14 +103,5 @@ impl PixelFormat {
             }
         }
         Ok(())
-    }
-
-    /// The given columns and, where two share U and V, their neighbours.
-    pub(crate) fn whole_groups(self, columns: Range<usize>) -> Range<usize> {
-        if self.shares_columns() {
-            columns.start / 2 * 2..columns.end.next_multiple_of(2)
-        } else {
-            columns
-        }
     }
 }

@@ -47,10 +47,8 @@ impl Window {
     /// The part inside a frame; it may be empty.
     #[must_use]
     pub fn within(self, frame: &impl Frame) -> Self {
-        let (right, bottom) = (
-            self.right.min(frame.width()),
-            self.bottom.min(frame.height()),
-        );
+        let right = self.right.min(frame.width());
+        let bottom = self.bottom.min(frame.height());
         Self {
             left: self.left.min(right),
             top: self.top.min(bottom),

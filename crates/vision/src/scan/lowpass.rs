@@ -67,13 +67,8 @@ impl LowPass {
                 Some(block) => S::i16s::from_slice(simd, &block[..S::i16s::LEN]),
                 None => end,
             };
-            step(
-                simd,
-                [before, after],
-                row,
-                [above, here, below, filtered],
-                (n, height),
-            );
+            let kept = [above, here, below, filtered];
+            step(simd, [before, after], row, kept, (n, height));
             before = S::i16s::from_slice(simd, &row[BLOCK - S::i16s::LEN..]);
         }
     }
@@ -85,7 +80,8 @@ impl LowPass {
     }
 }
 
-fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
+/// These blocks of a row.
+pub fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
     row.get_mut(blocks.clone()).unwrap_or_default()
 }
 
@@ -108,11 +104,8 @@ fn step<S: Simd>(
         };
         let centre = S::i16s::from_slice(simd, &here[start..end]);
         let under = if n < height {
-            mean::<S>(
-                shift_in::<S>(before, middle),
-                middle,
-                middle.slide::<1>(next),
-            )
+            let left = shift_in::<S>(before, middle);
+            mean::<S>(left, middle, middle.slide::<1>(next))
         } else {
             centre
         };

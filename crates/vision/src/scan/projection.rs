@@ -25,7 +25,8 @@ const FRACTION_BITS: u32 = 9;
 pub struct Projection {
     weights: [i16; 3],
     offset: i32,
-    threshold: i16,
+    /// Pixels above it are marker, in units of the projected values.
+    pub threshold: i16,
     /// See [`mark`](Self::mark).
     coarse_weights: [i16; 3],
     coarse_level: i16,
@@ -65,11 +66,6 @@ impl Projection {
             coarse_level,
             simd_dot: SimdDot::new(coarse_weights, coarse_level),
         }
-    }
-
-    /// Pixels above it are marker, in units of the projected values.
-    pub fn threshold(&self) -> i16 {
-        self.threshold
     }
 
     /// Projects a row; the values stay within +-8191.

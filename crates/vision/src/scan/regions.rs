@@ -24,7 +24,7 @@ pub struct Region {
 
 impl Region {
     fn of_run(v: usize, start: usize, end: usize) -> Self {
-        let (length, first, row) = (count(end - start), count(start), count(v));
+        let [length, first, row] = [end - start, start, v].map(|pixels| pixels as u64);
         Self {
             area: length,
             sum_u: length * (2 * first + length - 1) / 2,
@@ -205,8 +205,4 @@ fn join(parts: &mut [Part], one: usize, other: usize) -> usize {
         parts[first].region.merge(&region);
     }
     first
-}
-
-fn count(pixels: usize) -> u64 {
-    pixels as u64
 }

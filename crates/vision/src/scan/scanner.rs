@@ -17,7 +17,6 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// As a slice.
     pub fn as_slice(&self) -> &[Region] {
         self.kept.get(..self.count).unwrap_or_default()
     }
@@ -34,14 +33,13 @@ impl Regions {
 }
 
 /// Finds regions and runs of marker pixels, and keeps those of the last frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Scanner {
     segmenters: Vec<Segmenter>,
     labeller: Labeller,
     minimum_area: u64,
     /// The marker pixels of the last [`find`](Self::find).
     pub map: RunMap,
-    /// The regions.
     pub regions: Regions,
 }
 
@@ -51,10 +49,8 @@ impl Scanner {
         let segmenter = |discriminant: &ColorDiscriminant| Segmenter::new(*discriminant, smoothing);
         Self {
             segmenters: discriminants.iter().map(segmenter).collect(),
-            labeller: Labeller::default(),
             minimum_area,
-            map: RunMap::default(),
-            regions: Regions::default(),
+            ..Self::default()
         }
     }
 
@@ -81,31 +77,24 @@ impl Scanner {
         discriminant: usize,
         is_mapped: bool,
     ) {
-        let Self {
-            segmenters,
-            labeller,
-            minimum_area,
-            map,
-            regions,
-        } = self;
-        let Some(segmenter) = segmenters.get_mut(discriminant) else {
+        let Some(segmenter) = self.segmenters.get_mut(discriminant) else {
             return;
         };
         let mut keep = |region: Region| {
-            if region.area >= *minimum_area {
-                regions.keep(region);
+            if region.area >= self.minimum_area {
+                self.regions.keep(region);
             }
         };
-        labeller.start(frame.width());
+        self.labeller.start(frame.width());
         segmenter.each_row_in(frame, window, |v, runs| {
             runs.each(|start, end| {
-                labeller.add(v, start, end);
+                self.labeller.add(v, start, end);
                 if is_mapped {
-                    map.add(v, start, end);
+                    self.map.add(v, start, end);
                 }
             });
-            labeller.end_row(&mut keep);
+            self.labeller.end_row(&mut keep);
         });
-        labeller.end_row(&mut keep);
+        self.labeller.end_row(&mut keep);
     }
 }

@@ -94,8 +94,7 @@ fn sweep<S: Simd>(
     let delay = filter.passes();
     // The error at the border of the pixels that are read moves inwards by one pixel per pass.
     let read = window.grown(delay, frame);
-    let columns = frame.format().whole_groups(read.left..read.right);
-    let columns = whole_blocks(columns, frame.width());
+    let columns = whole_blocks(read.left..read.right, frame.width());
     let (width, height) = (columns.len(), read.bottom - read.top);
     let line = |n: usize| Row::of(frame, read.top + n).columns(columns.clone());
     // A pixel in row n changes the filtered rows n - delay to n + delay, which depend on rows n - 2 delay to
@@ -133,10 +132,9 @@ fn sweep<S: Simd>(
                 continue;
             };
             if (window.top..window.bottom).contains(&v) && active.is_active(step - first) {
-                let (marker, active) = (filter.marker(step - first), active.active(step - first));
                 let runs = Runs {
-                    marker,
-                    active,
+                    marker: filter.marker(step - first),
+                    active: active.active(step - first),
                     origin: columns.start,
                     window: [window.left, window.right],
                 };
@@ -146,9 +144,10 @@ fn sweep<S: Simd>(
     }
 }
 
-/// Extends columns to whole blocks, as far as the frame has them.
+/// Extends columns to whole blocks, as far as the frame has them, from an even one: it may share U and V with the next.
 fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
-    let wanted = columns.len().next_multiple_of(BLOCK).min(width);
-    let start = columns.start.min(width - wanted);
+    let start = columns.start / 2 * 2;
+    let wanted = (columns.end - start).next_multiple_of(BLOCK).min(width);
+    let start = start.min(width - wanted);
     start..start + wanted
 }
