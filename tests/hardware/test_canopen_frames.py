@@ -74,6 +74,16 @@ def test_sdo_download(
         assert bus.sent == [sent]
 
 
+def test_a_late_answer_does_not_close_the_channel() -> None:
+    """The answer to a request that was given up arrives before the next request."""
+    asked, answered = "601#4041600000000000", "581#4B41600037020000"
+    with open_transcript({asked: answered}) as (fieldbus, bus):
+        for _ in range(3):
+            bus.waiting.append("581#4B41600040020000")
+            fieldbus.receive_pending()
+            assert fieldbus.read(Dof.INSERTION, Entry(0x6041, 0, "statusword", 2)) == 0x237
+
+
 @pytest.mark.parametrize(
     ("code", "error"),
     [

@@ -59,6 +59,10 @@ class _Sdo(SdoClient):
         response: bytes = super().read_response()  # type: ignore[no-untyped-call]
         return response
 
+    def put(self, data: bytes) -> None:
+        """Take a response; the library replaces the queue where it has old ones."""
+        self.responses.put(data)
+
     def abort(self, abort_code: int = GENERAL_ERROR) -> None:
         """Send the abort without the library's log entry; the exception reports it."""
         self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
@@ -84,7 +88,7 @@ class CanopenFieldbus(master.CanopenMaster, Fieldbus):
             cobs = master.SDO_REQUEST + node.id, master.SDO_RESPONSE + node.id
             sdo = _Sdo(*cobs, ObjectDictionary())  # type: ignore[no-untyped-call]
             sdo.network, sdo.timeout = self._network, config.request_timeout
-            sdo.receive_one, sdo.responses = self.receive_one, node.sdo_responses
+            sdo.receive_one, node.on_sdo_response = self.receive_one, sdo.put
             self._sdo.append(sdo)
         try:
             self.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)

@@ -14,9 +14,8 @@ checked as they are read.
 
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from queue import Queue
 from typing import Any
 
 import can
@@ -44,6 +43,7 @@ class Node:
         has_heartbeat: Whether it sends heartbeats; else its answers alone are checked.
         controlword: The controlword sent last; None if it must be sent again.
         emergency: Its first emergency object that has not been reported.
+        on_sdo_response: Called with each SDO response.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Node:
     has_heartbeat: bool = True
     controlword: int | None = None
     emergency: bytes = b""
-    sdo_responses: Queue[bytes] = field(default_factory=Queue)
+    on_sdo_response: Callable[[bytes], None] = lambda data: None
 
 
 class CanopenMaster:
@@ -163,7 +163,7 @@ class CanopenMaster:
             one.statusword, one.position, one.mode = TX_PDO.unpack_from(data)
             one.age, one.answered_at, one.answers = 0, now, one.answers + 1
         elif function == SDO_RESPONSE and len(data) == 8:
-            node.sdo_responses.put(data)
+            node.on_sdo_response(data)
         elif function == HEARTBEAT and data:
             node.heartbeat_at, node.nmt_state = now, data[0] & 0x7F
             node.was_operational |= node.nmt_state == OPERATIONAL
