@@ -12,7 +12,7 @@ from tautscope.errors import SignalError
 class Scale:
     """Conversion of one DOF between SI units and encoder counts.
 
-    x = home + sign counts / counts_per_unit
+        x = home + sign counts / counts_per_unit
     """
 
     axis: AxisConfig
