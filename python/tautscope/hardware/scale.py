@@ -13,6 +13,8 @@ class Scale:
     """Conversion of one DOF between SI units and encoder counts.
 
         x = home + sign counts / counts_per_unit
+
+    `dof` is the motor, for errors.
     """
 
     axis: AxisConfig
