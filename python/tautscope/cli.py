@@ -20,11 +20,11 @@ from tautscope.commands import (
     console,
     demo,
     doctor,
-    hardware,
     jog,
     log,
     report,
     ros2,
+    run,
 )
 from tautscope.errors import USAGE, TautscopeError, notes
 from tautscope.extras import require_extras
@@ -120,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     log.add_parsers(verbs)
     report.add_parser(verbs)
     align.add_parser(verbs)
-    hardware.add_parser(verbs)
+    run.add_parser(verbs)
     console.add_parser(verbs)
     ros2.add_parser(verbs)
     bench.add_parser(verbs)

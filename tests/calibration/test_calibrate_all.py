@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from tautscope.calibration.geometry import sweep
 from tautscope.calibration.result import CalibrationResult
 from tautscope.cli import main
-from tautscope.commands import calibration_session, calibration_steps, printing
+from tautscope.commands import calibration_session, calibration_steps, question
 from tautscope.commands.calibration_rig import twin_config
 from tautscope.commands.calibration_steps import Step
 from tautscope.config import CameraConfig, Config, load_config
@@ -137,12 +137,12 @@ def test_the_terminal_answers_while_the_camera_has_the_input(
     text = Path("rig.toml").read_text().replace('url = "unix:', 'url = "pipe:0" # "')
     Path("rig.toml").write_text(text)
     monkeypatch.setattr("sys.stdin", io.StringIO("video\n"))
-    monkeypatch.setattr(printing, "TERMINAL", tmp_path / "none")
+    monkeypatch.setattr(question, "TERMINAL", tmp_path / "none")
     assert main([*COMMAND, "--out", "a"]) == 1  # nobody answers
     assert not steps.seen
     terminal = tmp_path / "terminal"
     terminal.write_text("Y\n")
-    monkeypatch.setattr(printing, "TERMINAL", terminal)
+    monkeypatch.setattr(question, "TERMINAL", terminal)
     assert main([*COMMAND, "--out", "b"]) == 0
     assert len(steps.seen) == 3
 

@@ -33,9 +33,12 @@ Send = Callable[[int, bytes], None]
 
 
 class CanopenNode:
-    """One CANopen device, without the objects of the indices `absent`.
+    """One CANopen device.
 
-    `send` is called with identifier and data of each frame.
+    Args:
+        node: Node id.
+        send: Called with identifier and data of each frame it sends.
+        absent: Indices of objects it lacks.
     """
 
     def __init__(self, node: int, send: Send, absent: Collection[int] = ()) -> None:

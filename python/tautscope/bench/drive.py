@@ -29,8 +29,13 @@ SERIAL_NUMBERS = 0x7A00_0000
 class SimulatedDrive(CanopenNode):
     """A drive with the CiA 402 state machine, modes 7 and 8, limits and quick stop.
 
-    `config` is the true rig, `modes` are those of operation that it supports; `log` is called with
-    the time and the event.
+    Args:
+        dof: DOF of its motor.
+        config: The true rig.
+        send: See `CanopenNode`.
+        log: Called with the time and the event.
+        modes: Supported modes of operation.
+        absent: See `CanopenNode`.
     """
 
     def __init__(

@@ -69,7 +69,11 @@ class SimulatedMotors(ABC):
         self._requests.append((kind, dof, delay))
 
     def request(self, line: str, *, others: tuple[str, ...] = ()) -> None:
-        """Inject the fault of a line, such as ``freeze rotation``; `others` are for the error.
+        """Inject the fault of a line: ``freeze rotation``, ``clear rotation``.
+
+        Args:
+            line: Kind and motor.
+            others: Further parts of the bench, for the error.
 
         Raises:
             ConfigError: There is no such fault or motor.

@@ -27,7 +27,14 @@ INSTRUCTION, CHECKSUM, DATA_RANGE, DATA_LENGTH, ACCESS = 2, 3, 4, 5, 7
 
 
 class SimulatedServo:
-    """One servo; `shaft` is where its horn is [counts], with all turns, which are unknown to it."""
+    """One servo.
+
+    Args:
+        axis: Of the true rig: id, model.
+        protocol: Its family.
+        shaft: Where its horn is [counts], with all turns; these are unknown to it.
+        log: Called with the time and the event.
+    """
 
     def __init__(
         self, axis: AxisConfig, protocol: str, shaft: int, log: Callable[[float, str], None]

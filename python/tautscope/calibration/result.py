@@ -41,7 +41,9 @@ class CalibrationResult:
         """The values and the record of the calibration, for `write_values` and `Config.replace`.
 
         An infinite standard deviation, that of a value which is not determined, is not recorded.
-        The date is that of `at`, by default now.
+
+        Args:
+            at: When it was done; now by default.
         """
         record: dict[str, Any] = {
             "date": (at or datetime.now(UTC)).isoformat(timespec="seconds"),

@@ -25,9 +25,15 @@ def add_verb(
     description: str,
     extras: Sequence[str] = (),
 ) -> argparse.ArgumentParser:
-    """Add a verb; `run` takes its options and returns the exit status, None has verbs of its own.
+    """Add a verb to the command line.
 
-    `tautscope.cli.main` first checks that the `extras` of the package are installed.
+    Args:
+        verbs: The verbs so far.
+        name: Its name.
+        run: What it does with its options; the exit status. None of a verb with verbs of its own.
+        help: One line for the list of verbs.
+        description: Text of its own ``--help``.
+        extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
     """
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
     # Of itself argparse takes a negative number with an exponent for an option.
@@ -51,9 +57,12 @@ def add_verbose(parser: argparse.ArgumentParser, default: int | str = 0) -> None
 
 
 def refuse_unused(options: argparse.Namespace, allowed: str, *names: str) -> None:
-    """Refuse options, of which a verb may lack some, that would have no effect.
+    """Refuse options that would have no effect.
 
-    `allowed` is what they need beside them, for the error.
+    Args:
+        options: Of a verb.
+        allowed: What they need beside them, for the error.
+        names: Their attributes; a verb may lack some.
 
     Raises:
         FieldError: One of them has another value than by default.

@@ -11,7 +11,8 @@ from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments, calibration_rig
 from tautscope.commands.calibrate_camera import add_board_options
 from tautscope.commands.calibration_session import CalibrationSession
-from tautscope.commands.printing import ask, print_json
+from tautscope.commands.printing import print_json
+from tautscope.commands.question import ask
 from tautscope.config import Config
 from tautscope.errors import TautscopeError, described
 from tautscope.runs.output_folder import check_free, default_folder

@@ -4,7 +4,8 @@ import argparse
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import add_yes, refuse_wrong_limits
-from tautscope.commands.printing import confirm, print_json
+from tautscope.commands.printing import print_json
+from tautscope.commands.question import confirm
 from tautscope.config.edit import writable_file, write_values
 from tautscope.config.servos import PORTS
 from tautscope.dof import Dof

@@ -32,7 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def check_options(options: argparse.Namespace, *, reads_config: bool = True) -> None:
     """Check before anything runs that the results can be written.
 
-    `reads_config`: whether ``--config`` is more than the file of ``--write``.
+    Args:
+        options: With those of `add_options`.
+        reads_config: Whether ``--config`` is more than the file of ``--write``.
 
     Raises:
         FieldError: ``--write`` without ``--config``, or ``--config`` without an effect.

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import confirm, progress_bar
+from tautscope.commands.printing import progress_bar
+from tautscope.commands.question import confirm
 from tautscope.config import Config
 from tautscope.config.calibration import TWIN
 from tautscope.config.placeholders import MARK, placeholders
@@ -91,9 +92,12 @@ def twin_device(options: argparse.Namespace, config: Config) -> dict[str, str]:
 def twin_config(
     options: argparse.Namespace, config: Config, *, camera_is_known: bool = False
 ) -> Config:
-    """The configuration of the simulated rig that is calibrated; `camera_is_known`: `open_rig`.
+    """The configuration of the simulated rig that is calibrated.
 
-    In a sequence the options have the values `drawn` at its start.
+    Args:
+        options: Of a calibration; with the values `drawn` once at the start of a sequence.
+        config: The configuration as it is now.
+        camera_is_known: As of `open_rig`.
     """
     from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
 

@@ -35,8 +35,14 @@ class SessionState(msgspec.Struct, forbid_unknown_fields=True):
 class CalibrationSession:
     """A sequence of calibrations of one configuration file, begun or resumed.
 
-    A new one has its report in `folder`; `restart` drops one that is unfinished. On a rig the seed,
-    that of the twin, is None.
+    Args:
+        file: The configuration.
+        folder: Folder of the report of a new session.
+        seed: Seed of the twin, None on a rig.
+        restart: Whether an unfinished session is dropped.
+
+    Attributes:
+        state: What is done.
 
     Raises:
         MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or the

@@ -29,10 +29,14 @@ MOTION = "motion"
 
 @dataclass(frozen=True)
 class Step:
-    """One step, what the user has to prepare, and what it does.
+    """One step.
 
-    That takes the options of the command, the configuration as it is then, and a folder for its own
-    files; the result has no values if it only checks.
+    Attributes:
+        name: ``camera``, ``colour``, ...
+        title: For the report.
+        todo: What the user has to prepare.
+        run: Takes the options of the command, the configuration as it is then, and a folder for
+            its own files; the result has no values if it only checks.
     """
 
     name: str

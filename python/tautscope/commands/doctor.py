@@ -8,7 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import ask, print_json
+from tautscope.commands.printing import print_json
+from tautscope.commands.question import ask
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders

@@ -20,9 +20,14 @@ def write_estimates(
     recorded: Recording | None,
     facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write the folder of a replay, and print its estimates beside the recorded ones, if any.
+    """Write the folder of a replay, and print its estimates beside the recorded ones.
 
-    `facts` are further entries of the JSON object.
+    Args:
+        options: Of the command.
+        folder: The new folder.
+        replayed: The estimates.
+        recorded: Those of the run, if there was one.
+        facts: Further entries of the JSON object.
     """
     write_replay(folder, replayed, recorded)
     after = estimation_quality(replayed, recorded)

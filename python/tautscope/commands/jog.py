@@ -6,7 +6,8 @@ from dataclasses import asdict
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import refuse_wrong_limits
-from tautscope.commands.printing import confirm, print_json
+from tautscope.commands.printing import print_json
+from tautscope.commands.question import confirm
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.dof import Dof, display_text
 from tautscope.errors import ConfigError, FieldError

@@ -1,4 +1,4 @@
-"""What commands print: text, tables, progress, with ``--json`` one object; and what they ask."""
+"""What commands print: text and tables, or with ``--json`` one object; progress on stderr."""
 
 from __future__ import annotations
 
@@ -11,14 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tautscope.config import CameraConfig
-from tautscope.errors import FieldError, OutputError
+from tautscope.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-TERMINAL = Path("/dev/tty")
-"""Where questions are asked while images come through the standard input."""
 
 
 def print_json(options: argparse.Namespace, document: dict[str, Any]) -> None:
@@ -31,7 +27,13 @@ def print_json(options: argparse.Namespace, document: dict[str, Any]) -> None:
 
 
 def announce(what: str, seconds: float, size: float, folder: Path) -> None:
-    """Print on stderr how long what runs takes [s], and the size [byte] and folder of its files.
+    """Print on stderr how long a command takes, and where it writes.
+
+    Args:
+        what: What runs.
+        seconds: Estimated duration [s].
+        size: Estimated, or largest size of the files [byte].
+        folder: Where they will be.
 
     Raises:
         OutputError: The disk has no room for the files.
@@ -88,26 +90,3 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share: bar.update(task, completed=share)
-
-
-def ask(question: str, camera: CameraConfig) -> str:
-    """Ask on stderr, and return the line typed in lower case; empty if there is nobody to answer.
-
-    If the images of the camera come through the standard input, the terminal is read instead.
-    """
-    print(question, end="", file=sys.stderr, flush=True)
-    if not camera.source.url.startswith("pipe:"):
-        return sys.stdin.readline().lower() if sys.stdin else ""  # None if it was closed
-    try:
-        with TERMINAL.open(encoding="utf-8") as terminal:
-            return terminal.readline().lower()
-    except OSError:
-        return ""
-
-
-def confirm(question: str, options: argparse.Namespace, camera: CameraConfig) -> None:
-    """Ask whether the motors may move, unless ``--yes``; an error if the answer is not y."""
-    if options.yes:
-        return
-    if ask(f"{question} Type y to start: ", camera).strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

@@ -27,10 +27,15 @@ JPEG_QUALITY = 80
 
 
 class StateFeed:
-    """The state of the control process, and its replies to each page, after the layout.
+    """The state of the control process, and its replies to each page.
 
-    `holder` is the connection that holds the lease, as of the newest state; `latency` returns that
-    of `ImageFeed`.
+    Args:
+        layout: Sent to each page once.
+        latency: Returns median and 95th percentile of the time from an image's arrival until it
+            was drawn [s], if they are known.
+
+    Attributes:
+        holder: The connection that holds the lease, as of the newest state.
     """
 
     def __init__(

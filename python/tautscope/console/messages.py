@@ -105,7 +105,12 @@ class SetProfile(Command, frozen=True, tag="profile"):
 
 
 class Seek(_Message, frozen=True, tag="seek"):
-    """Show another time of a recording [s from its begin], None to stay; needs no lease."""
+    """Show another time of a recording; needs no lease, and does nothing else.
+
+    Attributes:
+        time: From its begin [s]; None to stay.
+        is_playing: Whether time goes on.
+    """
 
     time: Annotated[float, Meta(ge=0, le=1e9)] | None
     is_playing: bool
@@ -130,9 +135,11 @@ decode_video = msgspec.json.Decoder(Drawn).decode
 
 
 class Received(Struct, frozen=True, tag=True):
-    """A message from the web server to the control process, and when it arrived [s, monotonic].
+    """A message with its connection, from the web server to the control process.
 
-    The page cannot choose the number of its connection, `client`.
+    Attributes:
+        client: Number of the connection; the page cannot choose it.
+        at: When it arrived [s, monotonic clock].
     """
 
     client: int
@@ -149,7 +156,10 @@ class Gone(Struct, frozen=True, tag=True):
 class Reply(Struct, frozen=True):
     """Result of a command, from the control process to a page.
 
-    `reason` is why it was not executed, or what a person should know of what was done.
+    Attributes:
+        client: Number of the page's connection.
+        what: The command.
+        reason: Why it was not executed, or what a person should know of what was done.
     """
 
     client: int

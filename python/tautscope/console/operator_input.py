@@ -155,9 +155,13 @@ class OperatorInput:
         self._end_program(reason)
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The reference (n,) [m or rad] of a control tick at a time [s, monotonic clock].
+        """The reference (n,) [m or rad] of a control tick.
 
-        `command` is the last one of the loop; `is_held` is whether the supervisor holds motion.
+        Args:
+            now: Time [s, monotonic clock].
+            period: Control period [s].
+            command: The last command of the loop (n,) [m or rad].
+            is_held: Whether the supervisor holds motion.
         """
         if is_held or self.stopped_by:
             self.interrupt("the supervisor holds motion" if self.program else "")

@@ -22,7 +22,14 @@ TWIN_TRAVEL = 4 / 3
 
 
 class MotionLimits(NamedTuple):
-    """Limits (n,) of speed [m/s or rad/s] and reference [m or rad], and where "home" ends."""
+    """Limits of the reference; every (n,) is [m or rad], or that per s.
+
+    Attributes:
+        speed: (n,) largest speed that the loop follows.
+        least: (n,) least reference.
+        most: (n,) largest reference.
+        start: (n,) where the program "home" ends.
+    """
 
     speed: Floats
     least: Floats
@@ -49,7 +56,13 @@ def motion_limits(config: Config) -> MotionLimits:
 
 
 class Program:
-    """Motions one after the other, for the time `elapsed` of `duration` [s]."""
+    """Motions one after the other.
+
+    Attributes:
+        name: Its name for people.
+        elapsed: Time since its start [s].
+        duration: Total duration [s].
+    """
 
     def __init__(self, name: str, motions: Sequence[Motion]) -> None:
         self.name, self._motions = name, motions

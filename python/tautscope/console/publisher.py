@@ -65,9 +65,13 @@ class Publisher:
     def submit(
         self, sequence: int, image: Image, arrived_at: float, bands: Bands | None = None
     ) -> None:
-        """Show an image that arrived at a time [s, monotonic clock], and bands drawn over it.
+        """Show an image, in place of one that still waits.
 
-        It replaces one that still waits; the sequence is that of `ImageTimes`.
+        Args:
+            sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
+            image: The image.
+            arrived_at: When the control loop got it [s, monotonic clock].
+            bands: What is drawn over it; None where nothing is.
         """
         self._next = image, Overlay(sequence, arrived_at, *self._size), bands
         self.image = image

@@ -35,9 +35,13 @@ def run_on_hardware(
     The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
     A run that is refused before the loop begins leaves no log and no folder.
 
-    The log is written to `folder`, which is new or empty, from the start. `progress` is called with
-    the fraction of the work done. The reference is by default the article's protocol; with
-    `compare` a run without compensation comes first, to compute the reduction.
+    Args:
+        config: With a section ``drives``.
+        folder: New or empty; the log is written there from the start.
+        progress: Called with the fraction of the work done, 0 to 1.
+        reference: By default the article's protocol.
+        compare: Run without compensation first, to compute the reduction.
+        make_rig: Makes the rig.
 
     Raises:
         ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`. The drives

@@ -100,9 +100,14 @@ class Codec:
     def update(
         self, clock: Clock, now: float, seen: Frame | Measurement, report: Report, count: int
     ) -> Messages:
-        """The messages of an update at rig time `now` [s]; the image's own is `image_message`.
+        """The messages of an update; of an image all but the image, which is `image_message`.
 
-        A measurement has the number `count` in the run, a frame its own.
+        Args:
+            clock: Of the run.
+            now: Rig time of the update [s].
+            seen: The frame or measurement.
+            report: Result of the update.
+            count: Number of the measurement in the run.
         """
         stamp = clock.nanoseconds(report.captured_at)
         row = update_row(self._columns, now, seen, report, count)

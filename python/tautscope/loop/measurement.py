@@ -75,9 +75,14 @@ def raw_values(measurement: Measurement) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """Values (m,) of a measurement, their covariance (m, m), and a model of the sensor.
+    """A measurement and its model.
 
-    `predict` is the model's values without derivatives; `point` is how many values are one point.
+    Attributes:
+        values: (m,).
+        covariance: (m, m).
+        model: Of values and derivatives.
+        predict: The values of the model alone.
+        point: How many values are one point.
     """
 
     values: Floats

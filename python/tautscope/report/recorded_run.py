@@ -114,7 +114,10 @@ class RecordedRun:
     ) -> None:
         """Write report.html, its figures, and table1.csv of the experiment, to an existing folder.
 
-        `further` figures have the names of their files, and captions.
+        Args:
+            place: The folder.
+            facts: Further facts of the run.
+            further: Files and captions of further figures.
         """
         # Matplotlib takes half a second to import.
         from tautscope.figure_style import style  # noqa: PLC0415

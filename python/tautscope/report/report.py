@@ -155,10 +155,13 @@ def figures_table(
     rows: Sequence[Row],
     article: Literal["true tip", "by camera"] | None = None,
 ) -> str:
-    """A table of figures: per DOF the median over the seeds, and the worst, by the column's title.
+    """A table of figures: per DOF each column's median over the seeds, and the worst.
 
-    With `article` the article's figures, which are by camera, are in a column of their own, beside
-    figures of the true tip or by camera; then the last column is bold.
+    Args:
+        columns: Figures per seed, by the column's title.
+        rows: The rows.
+        article: Whether the article's figures, which are by camera, are in a column of their own,
+            and beside the figures of what; then the last column is bold.
     """
     sources = [(combine(of, "median"), combine(of, "worst"), len(of)) for of in columns.values()]
     dofs = list(sources[0][0])
@@ -195,8 +198,10 @@ def row_explanations(
 ) -> str:
     """A table of what each row means, its goal, and for which DOFs results of ``best`` meet it.
 
-    Of the results per seed, none for another profile or rig, the median counts. Goals are those of
-    the article's instrument.
+    Args:
+        rows: Rows of the table above it.
+        results: Results per seed, of which the median counts; none for another profile or rig.
+        has_goals: Whether to show the goals, which are those of the article's instrument.
     """
     middle: dict[NamedDof, Figures] = combine(results, "median") if results else {}
     lines = []

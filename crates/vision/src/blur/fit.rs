@@ -29,6 +29,7 @@ pub struct BlurFit {
 impl BlurFit {
     /// Whether this is the intensity of two bands, at well-determined positions, with enough of each inside the image.
     pub fn is_accepted(&self, map: &RunMap, settings: &Settings) -> bool {
+        // Of the count only the pixels in the image matter, which no other outline changes.
         let is_inside =
             |own: &Outline| own.count(map, own).pixels >= settings.least_inside * own.area;
         let limits = &settings.blur;

@@ -56,7 +56,12 @@ class LabelledImage:
 
 
 def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
-    """Label an image by masks, not 0 on one band each, which lose their blurred edges."""
+    """Label an image by the masks of its bands, which lose their blurred edges.
+
+    Args:
+        image: B, G, R.
+        bands: One mask per band, not 0 on it.
+    """
     labels = np.full(image.shape[:2], BACKGROUND, np.uint8)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _RIM + 1,) * 2)
     masks = [(band > 0).astype(np.uint8) for band in bands]

@@ -91,9 +91,16 @@ class Coverage:
 
 
 class ViewCollector:
-    """Collects views of a board in images of a size [px], and counts why images are not used.
+    """Collects views of a board, and counts why images are not used.
 
-    Of a stream, whose images are consecutive, only views at rest that differ are used.
+    Args:
+        board: The board.
+        size: Width and height of the images [px].
+        is_stream: Whether images are consecutive; then only views at rest that differ are used.
+
+    Attributes:
+        views, coverage: The views used, and how they cover the image.
+        rejected: Number of images not used, by reason.
     """
 
     def __init__(self, board: Board, size: tuple[int, int], *, is_stream: bool) -> None:

@@ -86,8 +86,10 @@ def fit_intrinsics(
 ) -> CameraFit:
     """Fit a camera model to views of a board; views with large errors are left out once.
 
-    `tautscope.calibration.camera.coverage` says whether the views, at least 3, suffice. A pinhole
-    is for lenses up to about 100 degrees.
+    Args:
+        views: At least 3; `tautscope.calibration.camera.coverage` says whether they suffice.
+        size: Width and height of the images [px].
+        model: ``pinhole`` for lenses up to about 100 degrees, else ``fisheye``.
 
     Raises:
         CalibrationError: The views do not determine the camera, or do not agree with the board.

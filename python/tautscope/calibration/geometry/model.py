@@ -44,8 +44,10 @@ class Model:
     The elastic share a of insertion is the slope of the tip within the play, where a channel gives
     way under a shaft that sticks to it; for rotation and bending, a = 0.
 
-    The parameters are differences from a configuration; all images of the record are used. The
-    distance of the bands [m] may be measured.
+    Args:
+        config: The configuration that the parameters are differences from.
+        data: The record; all of its images are used.
+        band_distance: Measured distance of the bands [m], or None.
     """
 
     def __init__(self, config: Config, data: Recording, band_distance: float | None) -> None:

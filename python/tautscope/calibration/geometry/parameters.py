@@ -115,9 +115,12 @@ def estimated(intrinsics: Intrinsics, *, by_band_distance: bool) -> NDArray[np.b
 def configured(config: Config, band_distance: float | None, difference: Floats) -> Config:
     """Camera, pose and instrument at a difference from a configuration.
 
-    It is (parameters,) in SI units, relative for lengths and focal lengths (logarithm); the
-    distance of the bands' centres [m] may be measured. Nothing is checked: lengths and focal
-    lengths stay positive.
+    Nothing is checked: lengths and focal lengths stay positive.
+
+    Args:
+        config: The configuration.
+        band_distance: Measured distance of the bands' centres [m], or None.
+        difference: (parameters,) in SI units; relative for lengths and focal lengths (logarithm).
     """
     value = dict(zip(NAMES, difference.tolist(), strict=True))
     camera, instrument = config.camera, config.instrument

@@ -73,8 +73,11 @@ def solve(
     depend on the noise of the features, and the most probable lengths would be wrong by half
     (decision 0041). Features and states have soft-L1 weights.
 
-    Only `active` parameters are estimated; with `free_states` from the images alone, without the
-    expected tip.
+    Args:
+        model: Model of the record.
+        active: Which parameters are estimated.
+        start: First parameters.
+        free_states: Do not use the expected tip: geometry from the images alone.
     """
     z = np.zeros(len(active)) if start is None else start.copy()
     states, damping, last = model.expected(z), 1.0, np.inf

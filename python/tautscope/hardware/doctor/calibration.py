@@ -21,12 +21,18 @@ def check_calibration(
     now: datetime | None = None,
     kinds: Iterable[str] = CALIBRATIONS,
 ) -> list[CheckResult]:
-    """Check the records of calibrations, by default all of the article's instrument.
+    """Check the records of calibrations.
 
     A calibration of other devices, or older than one that it builds on, is missing: its values do
     not belong to this rig. One that was never done with ``tautscope calibrate``, or is older than
-    `CalibrationConfig.largest_age`, is a note: its values may be right. `serial_numbers` are those
-    of the devices that are connected, as far as known; `file` is for the remedies.
+    `CalibrationConfig.largest_age`, is a note: its values may be right.
+
+    Args:
+        config: Section ``calibration``.
+        serial_numbers: Those of the devices that are connected, as far as known.
+        file: The configuration, for the remedies.
+        now: Present time.
+        kinds: The calibrations, by default all of the article's instrument.
     """
     at = now or datetime.now(UTC)
     return [_check(kind, config, serial_numbers, shlex.quote(file), at) for kind in kinds]

@@ -106,7 +106,11 @@ class Servo:
     def reset_fault(self, before: int) -> int:
         """Restart a Dynamixel; a Feetech clears its faults when the torque is switched off.
 
-        Its position [counts] was `before`, and is what is returned.
+        Args:
+            before: Its position [counts].
+
+        Returns:
+            Its position [counts].
 
         Raises:
             StateError: The fault remains, or it has forgotten its turns.
