@@ -61,6 +61,20 @@ def test_a_flipped_bit_costs_at_most_its_chunk(recorded: Recorded, tmp_path: Pat
         )
 
 
+def test_an_index_whose_opcode_became_that_of_a_message_is_no_message(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    path, _, _ = recorded
+    data, at = bytearray(path.read_bytes()), 8
+    damaged = tmp_path / "damaged.mcap"
+    while data[at] != 0x0F:  # data end
+        if data[at] == 0x07:
+            data[at] = 0x05
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    damaged.write_bytes(data)
+    assert list(read_log(damaged).events) == list(read_log(path).events)
+
+
 def mcap(path: Path, topics: list[str]) -> Path:
     """A complete log of another program, with a message of each topic."""
     with path.open("wb") as file:

@@ -17,7 +17,8 @@ from tautscope.errors import MissingPathError, RecordError
 
 _MAX_CHUNK_SIZE = 2**30
 """Largest accepted size of an uncompressed chunk [bytes]; a damaged one could fill the memory."""
-_MESSAGE_OPCODES = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+_MESSAGE_OPCODES = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL)
+"""A message of a log is in a chunk, which has a checksum: one outside is a damaged record."""
 
 
 @dataclass(slots=True)
@@ -61,9 +62,7 @@ def unpack(opcode: int, payload: bytes) -> list[McapRecord]:
         return breakup_chunk(chunk, validate_crc=True)
     if opcode == Opcode.SCHEMA:
         return [Schema.read(stream)]
-    if opcode == Opcode.CHANNEL:
-        return [Channel.read(stream)]
-    return [Message.read(stream, len(payload))]
+    return [Channel.read(stream)]
 
 
 def read_records(file: IO[bytes], damage: Damage) -> Iterator[tuple[int, int, bytes]]:
