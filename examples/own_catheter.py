@@ -1,4 +1,4 @@
-"""A catheter of your own: two bending planes, and a tip that an EM tracker sees.
+"""A catheter of your own: two bending planes, and a tip that an EM tracker measures.
 
 Run it with ``uv run python examples/own_catheter.py``.
 """

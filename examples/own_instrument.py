@@ -1,7 +1,7 @@
 """An instrument of your own: five degrees of freedom with a gripper, six motors, two sensors.
 
 Three tendons bend it in two planes; the wire of the gripper runs beside them: own_instrument.toml.
-An EM tracker sees the tip, an encoder the jaw. ``uv run python examples/own_instrument.py``.
+An EM tracker measures the tip, an encoder the jaw. ``uv run python examples/own_instrument.py``.
 """
 
 from collections.abc import Iterable

@@ -148,7 +148,7 @@ FIGURES: dict[str, tuple[str, str, Callable[[Finished], Figure]]] = {
     ),
     "overspeed": (
         "alone",
-        "Tip overspeed: speed of the tip over the largest of the reference, last two periods; "
+        "Tip speed over the largest speed of the reference, every tick of the last two periods; "
         "dashed, the goal",
         shared.speeds,
     ),

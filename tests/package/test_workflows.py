@@ -14,3 +14,25 @@ def test_actions_are_named_by_commit_with_the_tag_as_comment(file) -> None:
     assert uses
     for action in uses:
         assert re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action), action
+
+
+def test_the_runner_gets_what_ci_installs_only_as_root() -> None:
+    scripts = [file.read_text(encoding="utf-8") for file in (ROOT / ".ci").iterdir()]
+    wanted = {
+        name
+        for script in scripts
+        for line in re.findall(r"apt-get install ([^)>]*)", script)
+        for name in line.split()
+        if not name.startswith("-")
+    }
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    # Ubuntu's name of the browser.
+    assert wanted and wanted - {"chromium"} <= set(workflow.split())
+
+
+def test_both_what_users_and_what_clones_get_is_audited() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "advisories.yml").read_text(encoding="utf-8")
+    compiled = re.findall(r"uv pip compile (.*?)--output-file (\S+)", workflow)
+    assert ["--no-config" in options for options, _ in compiled] == [True, False]
+    for _, file in compiled:
+        assert f"--requirement {file}" in workflow
