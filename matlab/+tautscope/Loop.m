@@ -118,7 +118,7 @@ classdef Loop < handle
         end
 
         function state = supervision(self)
-            % The reaction in force, the active and latched flags, and the share of the compensation in use.
+            % The reaction in force, the active and latched flags, and the share of the compensation that is allowed.
             %
             % The loop cannot stop drives: at the reactions quick_stop and disable your program must.
             state = tautscope_mex('supervision', self.serial);

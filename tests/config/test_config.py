@@ -258,13 +258,21 @@ def test_a_tick_is_not_a_stall() -> None:
 
 
 def test_a_delay_is_within_the_history() -> None:
-    config = axes(1, width_limit=1.0)
+    config = axes(1, width_limit=1.0).replace(**{"safety.off": ["late"]})
     longest = config.control.history
     config.replace(**{"measurement.delays": [0.0, longest]})
     with pytest.raises(
         ConfigError, match=r"measurement\.delays\[1\]: got .*at most control\.history"
     ):
         config.replace(**{"measurement.delays": [0.0, 1.01 * longest]})
+
+
+def test_a_delay_is_at_most_the_age_of_what_is_used() -> None:
+    config = axes(1, width_limit=1.0)
+    oldest = config.safety.frame_age
+    config.replace(**{"measurement.delays": [oldest]})
+    with pytest.raises(ConfigError, match=r"delays\[0\]: got 0\.4.*at most safety\.frame_age"):
+        config.replace(**{"measurement.delays": [0.4]})
 
 
 def test_what_is_older_than_the_history_is_late() -> None:

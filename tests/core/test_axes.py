@@ -222,6 +222,17 @@ def test_a_wrong_sign_of_one_sensor_ends_compensation(profile: Literal["best", "
     assert "start_check" not in loop.supervision.flags
 
 
+def test_a_sensor_that_gives_what_a_tracker_gives_without_a_tool_is_still_checked() -> None:
+    loop = HysteresisReduction(axes(2, width_limit=1.2))
+
+    def look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
+        second = -9999.0 if 0.05 < at < 0.1 else -tip[1]
+        return loop.on_tip([tip[0], second], at, np.eye(2) * 0.005**2)
+
+    operate(loop, Plays([0.6] * 2), look, amplitude=1.8, seconds=30.0)
+    assert "start_check" in loop.supervision.flags
+
+
 def test_axes_that_share_a_friction_release_each_other() -> None:
     """A shaft that slides and turns in a channel: Coulomb friction on a friction ellipse."""
     unit, half = np.array([12e-3, 2.6]), np.array([3.5e-3, 0.7])
@@ -527,6 +538,32 @@ def test_one_value_that_is_stuck_is_left_out() -> None:
     without, with_it = errors
     assert with_it[0] < 0.4 * without[0]
     assert with_it[1] < 0.1 * without[1]
+
+
+@pytest.mark.parametrize("rate", [1, 8])
+@pytest.mark.parametrize("fault", ["frozen", "innovation"])
+def test_a_fast_sensor_does_not_excuse_a_slow_one_of_another_dof(fault: str, rate: int) -> None:
+    """Sensor 0 fails after 20 s: the reaction is the same however often sensor 1 measures well."""
+    loop, plant, reactions = HysteresisReduction(axes(2, width_limit=1.0)), Plays([0.6, 0.6]), []
+    noise = np.random.default_rng(0)
+    for tick in range(9000):
+        time = tick * PERIOD
+        tip = plant(loop.step(0.8 * np.sin([0.8 * time, 0.63 * time]), time))
+        tip = tip + 0.003 * noise.standard_normal(2)
+        if tick % (16 // rate) == 1:
+            loop.on_tip([np.nan, tip[1]], time, sensor=1)
+        if tick % 16 == 7:
+            is_off = time > 20
+            value = tip[0] + 3.0 * is_off if fault == "innovation" else (tip[0], 0.123)[is_off]
+            loop.on_tip([value, np.nan], time)
+            reactions.append(loop.supervision.reaction)
+            if reactions[-1] == "fade":
+                break
+    assert fault in loop.supervision.flags
+    assert reactions[-1] == "fade"
+    # From the first hold on, compensation is not in full use between two bad measurements.
+    held = reactions[reactions.index("hold_estimate") :]
+    assert set(held[:-1]) == {"hold_estimate"}
 
 
 def test_without_the_check_of_frozen_sensors_measurements_count_as_they_are() -> None:

@@ -14,6 +14,7 @@ from play_model import play
 from tautscope._core import TipFilter
 from tautscope.config import load_config
 from tautscope.dof import Dof
+from tautscope.errors import ConfigError
 from tautscope.loop.construction import build_feature_model, core_settings
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.report.metrics import loop_width
@@ -113,6 +114,8 @@ def test_the_gain_of_a_play_is_estimated(gain: float, seed: int) -> None:
     command = 40 * np.sin(2 * np.pi * steps / 250) + 15 * np.sin(2 * np.pi * steps / 97)
     measured = gain * play(command, -10, 10, 0)
     measured += np.random.default_rng(seed).normal(0, 0.2, len(steps))
+    with pytest.raises(ConfigError, match=r"expected_width: got -4"):
+        TipFilter(core_settings(CONFIG), expected_width=-4.0, std=0.2)
     found = TipFilter(core_settings(CONFIG), expected_width=20.0, std=0.2)
     found.run(command, measured)
     assert abs(found.gain - gain) < 0.1, f"seed {seed}: {found.gain}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
-from tautscope import PlayRig, Report, Sample, Tip, axes, run_experiment
+from tautscope import HysteresisReduction, PlayRig, Report, Sample, Tip, axes, run_experiment
 from tautscope.config import Config, Sine, from_document
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import ActuatedRig, Actuators
@@ -55,6 +55,37 @@ def test_a_matrix_goes_there_and_back() -> None:
         motors = actuators.motors(q)
         np.testing.assert_allclose(motors, np.array(PAIRS) @ q + [5.0, 5.0, 0.0, 1.0])
         np.testing.assert_allclose(actuators.dofs(motors), q, rtol=1e-12)
+
+
+class Waking:
+    """Motors whose encoder is not ready in the first tick."""
+
+    is_awake = False
+
+    def motors(self, dofs: Floats) -> Floats:
+        if not Waking.is_awake:
+            Waking.is_awake = True
+            raise RuntimeError
+        return dofs
+
+    def dofs(self, motors: Floats) -> Floats:
+        return motors
+
+
+@pytest.mark.parametrize("off", [(), ("monitor",)])
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_a_map_that_fails_in_the_first_tick_moves_nothing_by_itself(
+    profile: str, off: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Waking, "is_awake", False)
+    waking = config(map="test_actuators:Waking", limits=[[-1, 1], [-1, 1]])
+    loop = HysteresisReduction(waking.replace(**{"profile": profile, "safety.off": off}))
+    with pytest.raises(RuntimeError):
+        loop.step([0.0, 0.0], 0.0)
+    for tick in range(1, 4):
+        reference = np.full(2, 1e-5 * tick)
+        np.testing.assert_allclose(loop.step(reference, 0.005 * tick), reference, atol=1e-3)
+    assert loop.supervision.flags == ()
 
 
 def test_units_of_motors_do_not_weigh() -> None:

@@ -106,10 +106,17 @@ def segments(count: int) -> Config:
     return from_document({"dof": dofs, "kinematics": kinematics})
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-7, 1e-4, 0.3, 2.0, 3.0])
+@pytest.mark.parametrize("size", [0.0, 1e-7, 1e-4, 0.3, 2.0, 3.0, np.pi - 1e-4, np.pi - 1e-7])
 def test_rotations_are_those_of_scipy(size: float) -> None:
     vector = size * np.array([2.0, -1.0, 2.0]) / 3
     oracle = Rotation.from_rotvec(vector)
     np.testing.assert_allclose(rotation_matrix(vector), oracle.as_matrix(), atol=1e-12)
     np.testing.assert_allclose(rotation_vector(oracle.as_matrix()), vector, atol=1e-9)
     np.testing.assert_allclose(check_rotation(oracle.as_quat()), oracle.as_matrix(), atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), np.array([2.0, -1.0, 2.0]) / 3])
+def test_half_a_turn_is_not_taken_for_none(axis: np.ndarray) -> None:
+    found = rotation_vector(rotation_matrix(np.pi * axis))
+    assert np.linalg.norm(found) == pytest.approx(np.pi)
+    assert abs(found @ axis) == pytest.approx(np.pi)

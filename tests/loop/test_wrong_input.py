@@ -37,6 +37,20 @@ class NoTip:
     """No kinematics."""
 
 
+class Quaternion:
+    """A tip with a quaternion in place of a matrix."""
+
+    def tip(self, _: object) -> object:
+        return np.zeros(3), np.zeros(4)
+
+
+class PositionOnly:
+    """A tip without an orientation."""
+
+    def tip(self, _: object) -> object:
+        return np.zeros(3)
+
+
 def one(**keys: Any) -> Config:
     return from_document({"dof": [{"name": "a", "width_limit": 1.0} | keys]})
 
@@ -124,6 +138,18 @@ CONFIGURATIONS: list[Case] = [
     (lambda: kind("no_such_module:Robot"), "kinematics.kind", "no_such_module", "module:Class"),
     (lambda: kind("test_wrong_input:Nothing"), "kinematics.kind", "Nothing", "module:Class"),
     (lambda: kind("test_wrong_input:NoTip"), "kinematics.kind", "NoTip", "the method tip(q)"),
+    (lambda: kind("test_wrong_input:Quaternion").on_pose([0, 0, 0], 0.0),
+     "kinematics.kind", "Quaternion", "(3, 3)"),
+    (lambda: kind("test_wrong_input:PositionOnly").on_pose([0, 0, 0], 0.0),
+     "kinematics.kind", "PositionOnly", "(3, 3)"),
+    (lambda: planes(estimation={"marker_deviation": 0.2}),
+     "estimation.marker_deviation", "0.2", "[[dof]] has no bands"),
+    (lambda: axes(2.0, width_limit=1.0), "count", "2.0", "1 to 8"),
+    (lambda: axes(2, width_limit=1.0, names=5), "names", "5", "a list of 2"),
+    (lambda: from_document({"insertion": {"delta_minus": -5.0, "delta_plus": 5.0}}),
+     "insertion.delta_minus", "-5.0", "0.008, safety.offset_limit"),
+    (lambda: from_document({"drives": {"preset": "epos4", "waive": [["6007"]]}}),
+     "drives.waive[0]", "6007", 'or "6007"'),
     (lambda: HysteresisReduction(one().replace(**{"kinematics.kind": "two_planes"})),
      "dof.name", "'a'", "bend_x"),
     (lambda: HysteresisReduction(FILE), "config", "'rig.toml'", "load_config(path)"),

@@ -5,7 +5,7 @@ use tautscope_core as core;
 use toml::{Table, Value};
 
 use crate::any_loop::{AnyLoop, Selection};
-use crate::axes::{AxesSettings, AxisSettings};
+use crate::axes::{AxesSettings, AxisSettings, ROUNDING};
 use crate::error::Error;
 use crate::ranges::{Number, Ranges};
 
@@ -55,6 +55,14 @@ const OF_AXES: [&str; 5] = ["control", "safety", "law", "estimation", "measureme
 /// Sections that only the other kind of loop uses, with `[[dof]]` and without.
 const UNUSED_BY_AXES: [&str; 4] = ["insertion", "rotation", "bending", "instrument"];
 const UNUSED_BY_ARTICLE: [&str; 2] = ["kinematics", "measurement"];
+/// Keys of `[estimation]` of the bands of an image.
+const OF_IMAGES: [&str; 5] = [
+    "marker_deviation",
+    "shape_deviation",
+    "image_deviation",
+    "misfit_deviation",
+    "misfit_travel",
+];
 /// Most characters of a name, as in `python/tautscope/config/axes.py`.
 const MOST_CHARACTERS: usize = 32;
 
@@ -118,6 +126,11 @@ impl Configuration {
         if !self.has_axes() {
             return self.check_article();
         }
+        let Relations {
+            control,
+            safety,
+            measurement,
+        } = self.read()?;
         let mut dofs = Vec::<AxisSettings>::new();
         for (index, entry) in self.table["dof"]
             .as_array()
@@ -130,35 +143,48 @@ impl Configuration {
                 .clone()
                 .try_into()
                 .map_err(|error| Error::of_value(&error, &path))?;
-            dof.check(entry["unit"].as_str() == Some("m"))
+            dof.check(entry["unit"].as_str() == Some("m"), &safety)
                 .map_err(|error| Error(format!("{path}{error}")))?;
             dofs.push(dof);
         }
         check_friction(&dofs)?;
-        let Delays {
-            control,
-            measurement,
-        } = self.read()?;
+        let mut limits = vec![("control.history", control.history)];
+        if !safety.off.contains(core::Flag::Late) {
+            limits.push(("safety.frame_age", safety.frame_age));
+        }
         for (index, delay) in measurement.delays.iter().enumerate() {
-            if *delay > control.history {
-                return Err(Error(format!(
-                    "measurement.delays[{index}]: got {delay}, expected at most control.history = {}",
-                    control.history
-                )));
+            for (name, limit) in &limits {
+                if delay > limit {
+                    return Err(Error(format!(
+                        "measurement.delays[{index}]: got {delay}, expected at most {name} = {limit}"
+                    )));
+                }
             }
         }
         Ok(())
     }
 
     fn check_article(&self) -> Result<(), Error> {
-        for Dof { name, .. } in &self.dofs {
+        let Safety { safety } = self.read()?;
+        let is_limited = !safety.off.contains(core::Flag::WidthLimit);
+        for (Dof { name, .. }, limit) in self.dofs.iter().zip(safety.offset_limit) {
             let dof: core::DofSettings = self.table[name]
                 .clone()
                 .try_into()
                 .map_err(|error| Error::of_value(&error, &format!("{name}.")))?;
             check_dof(&dof).map_err(|error| Error(format!("{name}.{error}")))?;
+            let offsets = [
+                ("delta_minus", dof.delta_minus),
+                ("delta_plus", dof.delta_plus),
+            ];
+            for (key, offset) in offsets {
+                if is_limited && offset.abs() > limit * ROUNDING {
+                    return Err(Error(format!(
+                        "{name}.{key}: got {offset}, expected at most safety.offset_limit = {limit} from 0"
+                    )));
+                }
+            }
         }
-        let Safety { safety } = self.read()?;
         for (index, (low, high)) in safety.command_travel.iter().enumerate() {
             if low >= high {
                 return Err(Error(format!(
@@ -225,8 +251,9 @@ impl Configuration {
 }
 
 #[derive(serde::Deserialize)]
-struct Delays {
+struct Relations {
     control: core::ControlSettings,
+    safety: core::SafetySettings,
     measurement: Measurement,
 }
 
@@ -383,6 +410,10 @@ fn merge(
                 .as_ref()
                 .and_then(|default| default.as_array())
                 .is_some_and(|all| all.len() == 3);
+        let is_of_images = name == "estimation" && OF_IMAGES.contains(&key.as_str());
+        if has_axes && is_of_images && default.as_deref() != Some(value) {
+            return Err(Error(format!("{name}.{key}: not used with [[dof]]")));
+        }
         if has_axes && is_of_article && default.as_deref() != Some(value) {
             return Err(Error(format!(
                 "{name}.{key}: not used with [[dof]], which has its own"

@@ -193,6 +193,32 @@ fn errors_of_initial_offsets_name_their_limits() {
             one("delta_minus = -0.6\ndelta_plus = 0.6"),
             "dof[0].delta_plus: got 0.6, expected at most width_limit above",
         ),
+        (
+            "[insertion]\ndelta_minus = -5.0\ndelta_plus = 5.0".into(),
+            "insertion.delta_minus: got -5, expected at most safety.offset_limit = 0.008 from 0",
+        ),
+    ]);
+    let wide = [
+        one("delta_minus = -0.9\ndelta_plus = 0.9"),
+        "[insertion]\ndelta_minus = -0.05\ndelta_plus = 0.05\n".into(),
+    ];
+    for text in wide {
+        let off = format!("{text}\n[safety]\noff = [\"width_limit\"]");
+        assert!(Configuration::parse(&off).is_ok(), "{off}");
+    }
+}
+
+#[test]
+fn a_delay_is_within_history_and_age() {
+    check_errors(&[
+        (
+            format!("{ONE}[measurement]\ndelays = [0.1, 0.4]"),
+            "measurement.delays[1]: got 0.4, expected at most safety.frame_age = 0.3",
+        ),
+        (
+            format!("{ONE}[measurement]\ndelays = [3.0]\n[safety]\noff = [\"late\"]"),
+            "measurement.delays[0]: got 3, expected at most control.history = 2",
+        ),
     ]);
 }
 
@@ -344,6 +370,10 @@ fn what_has_no_effect_is_refused() {
         (
             format!("{ONE}[rotation]\ngain_limit = 4.0"),
             "rotation.gain_limit: not used with [[dof]]",
+        ),
+        (
+            format!("{ONE}[estimation]\nmarker_deviation = 0.2"),
+            "estimation.marker_deviation: not used with [[dof]]",
         ),
         (
             "[measurement]\ndelays = [0.1]".into(),

@@ -28,7 +28,7 @@ enum TautscopeResult
     TAUTSCOPE_RESULT_SIGNAL = 3,
     // The image is not what the configured camera gives; the loop is unchanged.
     TAUTSCOPE_RESULT_IMAGE = 4,
-    // The member `size` of a structure is smaller than the structure of this version.
+    // The member `size` of a structure is smaller than the structure of this version, or a count is not that of the loop.
     TAUTSCOPE_RESULT_SIZE = 5,
     // An error in this library; the handle cannot be used any more.
     TAUTSCOPE_RESULT_INTERNAL = 6,
@@ -84,7 +84,7 @@ enum TautscopeReaction
     TAUTSCOPE_REACTION_HOLD_ESTIMATE = 2,
     // As `HOLD_ESTIMATE`, and reduce the compensation to nothing with motion.
     TAUTSCOPE_REACTION_FADE = 3,
-    // Move the command as the reference does, at a constant difference.
+    // Do not compensate: move the command as the reference does. Profile `best` gives back the difference with motion.
     TAUTSCOPE_REACTION_PASS_THROUGH = 4,
     // Hold the command; motion of the reference is discarded.
     TAUTSCOPE_REACTION_HOLD_MOTION = 5,
@@ -434,7 +434,7 @@ typedef struct TautscopeSupervision {
     uint32_t latched;
     // 0.
     uint32_t reserved;
-    // Share of the compensation in use, 0 to 1.
+    // Share that the supervisor allows of the compensation chosen by `tautscope_loop_set_compensation`, 0 to 1.
     double share;
 } TautscopeSupervision;
 
@@ -642,7 +642,7 @@ TautscopeResult tautscope_loop_acknowledge(struct TautscopeLoop *handle);
 TautscopeResult tautscope_loop_set_compensation(struct TautscopeLoop *handle, double share);
 
 // Raises a `TautscopeFlag` that only the rig can detect. `DRIVE_FAULT` stops the motion; the reaction is then `QUICK_STOP`,
-// until `tautscope_loop_engage`.
+// until `tautscope_loop_engage`; raised again after `safety.hold_time` or `hold_travel` it is `DISABLE`, for good.
 //
 // # Safety
 // The handle is valid and used by this thread only.

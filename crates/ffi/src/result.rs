@@ -19,7 +19,7 @@ pub enum TautscopeResult {
     Signal = 3,
     /// The image is not what the configured camera gives; the loop is unchanged.
     Image = 4,
-    /// The member `size` of a structure is smaller than the structure of this version.
+    /// The member `size` of a structure is smaller than the structure of this version, or a count is not that of the loop.
     Size = 5,
     /// An error in this library; the handle cannot be used any more.
     Internal = 6,

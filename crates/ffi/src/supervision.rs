@@ -68,7 +68,7 @@ pub unsafe extern "C" fn tautscope_loop_set_compensation(
 }
 
 /// Raises a `TautscopeFlag` that only the rig can detect. `DRIVE_FAULT` stops the motion; the reaction is then `QUICK_STOP`,
-/// until `tautscope_loop_engage`.
+/// until `tautscope_loop_engage`; raised again after `safety.hold_time` or `hold_travel` it is `DISABLE`, for good.
 ///
 /// # Safety
 /// The handle is valid and used by this thread only.

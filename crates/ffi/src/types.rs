@@ -36,7 +36,7 @@ pub enum TautscopeReaction {
     HoldEstimate = 2,
     /// As `HOLD_ESTIMATE`, and reduce the compensation to nothing with motion.
     Fade = 3,
-    /// Move the command as the reference does, at a constant difference.
+    /// Do not compensate: move the command as the reference does. Profile `best` gives back the difference with motion.
     PassThrough = 4,
     /// Hold the command; motion of the reference is discarded.
     HoldMotion = 5,
@@ -285,7 +285,7 @@ pub struct TautscopeSupervision {
     pub latched: u32,
     /// 0.
     pub reserved: u32,
-    /// Share of the compensation in use, 0 to 1.
+    /// Share that the supervisor allows of the compensation chosen by `tautscope_loop_set_compensation`, 0 to 1.
     pub share: f64,
 }
 

@@ -4,12 +4,10 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from tautscope._core import MOST_RANGE, OFFSET_LIMIT, SPEED
+from tautscope._core import MOST_RANGE, SPEED
 from tautscope.config.fields import LIMITS, Angle, Gain, NonNegative, Position, Positive, Rotation
 from tautscope.config.section import Section, require, require_at_most
 
-_ROUNDING = 1 + 1e-9
-"""An estimate at a limit may be an initial offset."""
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
 
 
@@ -88,14 +86,6 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if self.expected_width is not None:
             require_at_most("", self, "expected_width", "width_limit")
         require_at_most("", self, "delta_minus", "delta_plus")
-        limit = OFFSET_LIMIT * self.width_limit
-        near = f"from {-limit:.3g} to {limit:.3g}, 2/3 width_limit"
-        for key in ("delta_minus", "delta_plus"):
-            offset = getattr(self, key)
-            require(abs(offset) <= limit * _ROUNDING, key, offset, near)
-        most = self.delta_minus + self.width_limit * _ROUNDING
-        near = f"at most {most:.3g}, width_limit above delta_minus"
-        require(self.delta_plus <= most, "delta_plus", self.delta_plus, near)
 
 
 class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -10,9 +10,9 @@ from msgspec import Struct
 from msgspec.inspect import FloatType, IntType, TupleType, type_info
 from msgspec.structs import asdict, fields
 
-from tautscope._core import MOST_DOFS
+from tautscope._core import MOST_DOFS, OFFSET_LIMIT
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
-from tautscope.config.control import DofConfig
+from tautscope.config.control import DofConfig, EstimationConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.fields import MOST_RATIO
 from tautscope.config.safety import SafetyConfig
@@ -52,7 +52,10 @@ _OF_THE_ARTICLE = (
 
 
 def check_axes(
-    dofs: Sequence[DofEntry], kinematics: KinematicsConfig, safety: SafetyConfig
+    dofs: Sequence[DofEntry],
+    kinematics: KinematicsConfig,
+    safety: SafetyConfig,
+    estimation: EstimationConfig,
 ) -> None:
     """Check the entries of [[dof]] with each other, and what names them."""
     known = [dof.name for dof in dofs] if kinematics.kind in ("two_planes", "segments") else []
@@ -71,6 +74,42 @@ def check_axes(
         allowed = f"its default: {path} shares no friction"
         require(bool(dof.friction) or dof.lever == 1.0, f"{path}.lever", dof.lever, allowed)
     require_defaults(safety, "safety", _OF_THE_ARTICLE, "[[dof]] has its own")
+    require_defaults(estimation, "estimation", _OF_IMAGES, "[[dof]] has no bands")
+
+
+_OF_IMAGES = (
+    "marker_deviation",
+    "shape_deviation",
+    "image_deviation",
+    "misfit_deviation",
+    "misfit_travel",
+)
+"""Keys of [estimation] that a robot with [[dof]] does not use."""
+_ROUNDING = 1 + 1e-9
+"""An estimate at a limit may be an initial offset."""
+
+
+def check_offsets(
+    dofs: Sequence[DofEntry], safety: SafetyConfig, article: Mapping[Dof, DofConfig]
+) -> None:
+    """Check initial offsets against the limits of estimated ones, which `safety.off` may lift."""
+    if "width_limit" in safety.off:
+        return
+    for index, dof in enumerate(dofs):
+        limit = OFFSET_LIMIT * dof.width_limit
+        _check_offsets(f"dof[{index}]", dof, limit, "2/3 width_limit")
+        most = dof.delta_minus + dof.width_limit * _ROUNDING
+        near = f"at most {most:.3g}, width_limit above delta_minus"
+        require(dof.delta_plus <= most, f"dof[{index}].delta_plus", dof.delta_plus, near)
+    if not dofs:
+        for (axis, own), limit in zip(article.items(), safety.offset_limit, strict=True):
+            _check_offsets(axis.label, own, limit, "safety.offset_limit")
+
+
+def _check_offsets(path: str, own: DofEntry | DofConfig, limit: float, name: str) -> None:
+    near = f"from {-limit:.3g} to {limit:.3g}, {name}"
+    for key, offset in (("delta_minus", own.delta_minus), ("delta_plus", own.delta_plus)):
+        require(abs(offset) <= limit * _ROUNDING, f"{path}.{key}", offset, near)
 
 
 def check_unused(config: Struct) -> None:

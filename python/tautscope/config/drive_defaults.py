@@ -42,7 +42,7 @@ def with_drive_defaults(drives: dict[str, Any]) -> dict[str, Any]:
     if preset in get_args(Preset):
         of_preset = tomllib.loads((FOLDER / f"{preset}.toml").read_text(encoding="utf-8"))
         own = drives.get("waive", [])
-        if isinstance(own, list | tuple):
+        if isinstance(own, list | tuple) and all(isinstance(code, str) for code in own):
             own = list(dict.fromkeys([*of_preset.get("waive", []), *own]))
         filled = of_preset | filled | {"waive": own}
     for dof in Dof:

@@ -2,7 +2,8 @@
 
 import logging
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -89,10 +90,12 @@ def axes(
     Raises:
         ConfigError: A value is out of range, or a list has another length.
     """
-    if count not in range(1, MOST_DOFS + 1):
+    if not isinstance(count, Integral) or count not in range(1, MOST_DOFS + 1):
         raise ConfigError("count", count, f"1 to {MOST_DOFS}")
-    default = [f"axis_{index + 1}" for index in range(count)]
-    given = {"name": list(names or default), "width_limit": width_limit, "unit": unit, **keys}
+    if names is not None and not isinstance(names, Iterable):
+        raise ConfigError("names", names, f"a list of {count}")
+    named = [f"axis_{index + 1}" for index in range(count)] if names is None else list(names)
+    given = {"name": named, "width_limit": width_limit, "unit": unit, **keys}
     columns: dict[str, Sequence[Any]] = {}
     for key, value in without_numpy(given).items():
         is_list = isinstance(value, Sequence) and not isinstance(value, str)

@@ -14,6 +14,7 @@ from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
 from tautscope.config.checks import (
     check_axes,
+    check_offsets,
     check_ranges,
     check_references,
     check_topics,
@@ -77,19 +78,24 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Motors that are not the degrees of freedom."""
 
     def _check(self) -> None:
-        check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
-        check_axes(self.dof, self.kinematics, self.safety)
+        article = {dof: self[dof] for dof in Dof}
+        check_references(self.safety, self.experiment, article)
+        check_axes(self.dof, self.kinematics, self.safety, self.estimation)
+        check_offsets(self.dof, self.safety, article)
         check_ranges(self)
         check_unused(self)
         check_topics(self.kinematics, self.measurement)
         stall, least = self.safety.stall, 2 * self.control.period
         allowed = f"at least {least:g}, two of control.period: each tick would stop the motion"
         require(stall >= least, "safety.stall", stall, allowed)
+        limits = {"control.history": self.control.history}
+        if "late" not in self.safety.off:
+            limits["safety.frame_age"] = self.safety.frame_age
         delays = enumerate(self.measurement.delays)
         ages = {f"measurement.delays[{index}]": delay for index, delay in delays}
         for key, age in (ages | {"safety.frame_age": self.safety.frame_age}).items():
-            allowed = f"at most control.history = {self.control.history:g}"
-            require(age <= self.control.history, key, age, allowed)
+            for name, limit in limits.items():
+                require(age <= limit, key, age, f"at most {name} = {limit:g}")
         if self.actuators is not None:
             check_actuators(self.actuators, self.dof)
         if self.drives is not None:

@@ -17,7 +17,8 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Supervision of the loop [ours]; docs/safety.md lists the reaction to each flag.
 
     Three values are those of insertion, rotation and bending, in [m, rad, rad] or those per second.
-    "Stops": until the operator re-engages. The settings change nothing in a run without a fault.
+    "Stops": until the operator re-engages. In a run without a fault only `width_limit`,
+    `command_speed` and `reference_age` matter, which bound the law as well.
     """
 
     off: tuple[str, ...] = ()
@@ -38,7 +39,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     [s]."""
     command_speed: PerDof = (0.4, 27.0, 16.0)
     """Largest speed of the command: a faster one stops. The reference is followed at no more than
-    this over `gain_limit`."""
+    this, by profile ``paper`` over `gain_limit`."""
     command_travel: tuple[Range, Range, Range] = USUAL_TRAVEL
     """Least and largest command [m, rad, rad]."""
     reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)

@@ -89,19 +89,19 @@ class Placed:
     """
 
     def __init__(self, kinematics: Kinematics, config: KinematicsConfig) -> None:
-        self._kinematics = kinematics
+        self.own = kinematics
         self._position = np.array(config.base_position)
         self._base = rotation_matrix(np.array(config.base_rotation))
         self._sensor = rotation_matrix(np.array(config.sensor_rotation))
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # copies and pickles ask for these before there is a kinematics
+        if name == "own" or name.startswith("_"):  # copies and pickles ask before there is one
             raise AttributeError(name)
-        return getattr(self._kinematics, name)
+        return getattr(self.own, name)
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) that the sensor measures in a state."""
-        position, rotation = self._kinematics.tip(q)
+        position, rotation = self.own.tip(q)
         return self._position + self._base @ position, self._base @ rotation @ self._sensor
 
 
@@ -213,10 +213,15 @@ def rotation_matrix(vector: Floats) -> Floats:
 
 
 def rotation_vector(matrix: Floats) -> Floats:
-    """Rotation vector (3,) [rad] of a rotation matrix (3, 3); not near half a turn."""
+    """Rotation vector (3,) [rad] of a rotation matrix (3, 3)."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
     skew = (zy - yz, xz - zx, yx - xy)
-    sine = math.hypot(*skew) / 2
-    angle = math.atan2(sine, (xx + yy + zz - 1) / 2)
+    sine, cosine = math.hypot(*skew) / 2, (xx + yy + zz - 1) / 2
+    angle = math.atan2(sine, cosine)
+    if sine < _SMALL and cosine < 0.0:
+        # Near half a turn the skew part vanishes; the rest is (1 - cos) n n' of the axis n.
+        outer = (matrix + matrix.T) / 2 - cosine * np.eye(3)
+        axis: Floats = outer[:, np.argmax(np.diagonal(outer))]
+        return axis * math.copysign(angle / math.hypot(*axis), np.dot(axis, skew))
     scale = (1.0 + angle**2 / 6 if sine < _SMALL else angle / sine) / 2
     return np.array([scale * each for each in skew])

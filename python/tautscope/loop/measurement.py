@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope._core import MOST_VALUES
 from tautscope.config import Config
-from tautscope.errors import SignalError
+from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.kinematics import (
     STEP,
     Floats,
     Kinematics,
+    Placed,
     Predict,
     jacobian_by_differences,
     rotation_vector,
@@ -114,7 +115,7 @@ class Sensors:
             covariance = _covariance(given, settings.tip_deviation * self._widths)
             return Reading(values, covariance, lambda q: (q, identity), np.copy)
         if isinstance(measurement, Pose):
-            kinematics = self._with("tip", "on_pose")
+            kinematics = self._with_tip
             place = check_numbers("position", measurement.position, (3,))
             std = np.full(3, settings.position_deviation)
             if measurement.orientation is None:
@@ -156,6 +157,17 @@ class Sensors:
             return checked(q), rows
 
         return Reading(values, covariance, model, checked, point)
+
+    @cached_property
+    def _with_tip(self) -> Kinematics:
+        kinematics = self._with("tip", "on_pose")
+        own = kinematics.own if isinstance(kinematics, Placed) else kinematics
+        found: object = own.tip(np.array([sum(dof.travel) / 2 for dof in self._config.dof]))
+        shapes = [np.shape(part) for part in found] if isinstance(found, tuple | list) else None
+        if shapes != [(3,), (3, 3)]:
+            allowed = "a class whose tip(q) returns a position (3,) and a rotation matrix (3, 3)"
+            raise ConfigError("kinematics.kind", self._config.kinematics.kind, allowed)
+        return kinematics
 
     def _with(self, method: str, call: str) -> Kinematics:
         kinematics = self._kinematics

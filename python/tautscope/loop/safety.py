@@ -77,7 +77,8 @@ class Reaction(StrEnum):
     FADE = "fade"
     """As `HOLD_ESTIMATE`, and reduce the compensation to nothing with motion."""
     PASS_THROUGH = "pass_through"
-    """Move the command as the reference does, at a constant difference."""
+    """Do not compensate: move the command as the reference does. Profile ``best`` gives back the
+    difference with motion."""
     HOLD_MOTION = "hold_motion"
     """Hold the command; motion of the reference is discarded."""
     QUICK_STOP = "quick_stop"
@@ -109,7 +110,8 @@ class Supervision:
     Attributes:
         flags: The active flags, by the names of `DETECTORS`.
         latched: The flags raised since the last acknowledgement.
-        lead: Share of the free gain in use, 0 to 1.
+        lead: Share that the supervisor allows of the chosen compensation
+            (`HysteresisReduction.set_compensation`), 0 to 1.
     """
 
     reaction: Reaction

@@ -31,6 +31,7 @@ impl AxisFilter {
         std: f64,
     ) -> Result<Self, ConfigError> {
         require_positive("std", std)?;
+        require_positive("expected_width", expected_width)?;
         let unit = 0.75 * expected_width;
         let transmission = Transmission::new(Friction::independent(), [unit])?;
         let estimate = Estimate::new(settings, transmission, [], &[Slack::default()], [unit])?;

@@ -7,6 +7,7 @@ use crate::error::{ConfigError, require_positive};
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
+use crate::math::linear::square;
 use crate::model::plays::{
     COEFFICIENTS, GAIN_ROW, OFFSET, OWN, Plays, Radii, Row, SHARED, Transmission, product,
 };
@@ -288,12 +289,14 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         )
     }
 
-    /// Makes the offset of every tip less certain by standard deviations (N,) [m or rad].
-    pub fn loosen(&mut self, std: [f64; N]) {
-        for (index, (std, unit)) in std.into_iter().zip(self.transmission.unit()).enumerate() {
-            let std = std / unit;
-            self.kalman
-                .add_variance(index * COEFFICIENTS + OFFSET, std * std);
+    /// Makes the offset of every tip less certain by standard deviations (N,), at most up to others (N,) [m or rad].
+    pub fn loosen(&mut self, std: [f64; N], most: [f64; N]) {
+        let dofs = std.into_iter().zip(most).zip(self.transmission.unit());
+        for (index, ((std, most), unit)) in dofs.enumerate() {
+            let offset = index * COEFFICIENTS + OFFSET;
+            let left = square(most / unit) - self.kalman.covariance(offset, offset);
+            let variance = square(std / unit).min(left.max(0.0));
+            self.kalman.add_variance(offset, variance);
         }
     }
 
@@ -424,8 +427,10 @@ fn of_dof<const D: usize>(index: usize, row: &Row) -> SVector<f64, D> {
 /// Mean and variance of the coefficients of a DOF before the first image.
 fn prior(settings: &EstimateSettings, dof: &Radii, start: &Slack) -> (Row, Row) {
     let (mut mean, mut variance) = ([0.0; COEFFICIENTS], [0.0; COEFFICIENTS]);
+    // Beyond the widest play every weight would be 0.
+    let widest = dof.all().fold(0.0, f64::max);
     let expected = if start.half_width > 0.0 {
-        start.half_width / dof.unit
+        (start.half_width / dof.unit).min(widest)
     } else {
         EXPECTED
     };

@@ -136,6 +136,14 @@ impl<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> History<S, N> {
         self.span
     }
 
+    /// Time that it covers when it is full, in s: less than the span where ticks are faster than the period.
+    pub fn covered(&self) -> f64 {
+        let oldest = self.aged(self.capacity() - 1);
+        oldest.map_or(self.span, |oldest| {
+            self.span.min(self.newest_time() - oldest.time)
+        })
+    }
+
     /// The ticks after `time`, oldest first.
     pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry<N>> + Clone {
         let count = (0..self.len)

@@ -28,8 +28,10 @@ pub const ERRORS: usize = GEOMETRY + 4;
 const CONTACT: f64 = 0.9;
 /// Shift of the image, over its standard deviation before and after the images, from which on the geometry counts as wrong.
 const CERTAIN: f64 = 3.0;
-/// Standard deviation by which an image without markers makes the tip less certain, in `start_deviation`.
+/// Standard deviation by which an image without markers makes the tip less certain, and up to which, in `start_deviation`:
+/// beyond it, a bend in the opposite direction, half a turn on, would be found as well.
 const MISS: f64 = 0.03;
+const MISSED: f64 = 0.5;
 /// Plays of the past that are kept for measurements that arrive late, over the history's span.
 const PASTS: usize = 8;
 
@@ -129,14 +131,22 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
         history: &History<S, N>,
         has_clock_gone_back: bool,
     ) {
-        if has_clock_gone_back || self.newest.time.is_nan() {
+        let newest = history.newest_time();
+        if has_clock_gone_back {
+            // The history has forgotten what was before.
+            self.newest = PastPlays {
+                time: newest,
+                plays: self.law.plays,
+            };
+            self.older = [self.newest; PASTS];
+        } else if self.newest.time.is_nan() {
             self.newest.time = f64::NEG_INFINITY;
             self.older = [self.newest; PASTS];
         }
         // The history forgets what the plays of the measurements have not followed.
-        let newest = history.newest_time();
-        if newest - self.newest.time > 0.75 * history.span()
-            && let Some(half) = history.at(newest - history.span() / 2.0)
+        let covered = history.covered();
+        if newest - self.newest.time > 0.75 * covered
+            && let Some(half) = history.at(newest - covered / 2.0)
         {
             self.advance(history, &half);
         }
@@ -191,13 +201,16 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> Profile<N>
     }
 
     fn miss(&mut self, _: &Entry<N>) {
-        self.estimate
-            .loosen(self.dofs.map(|dof| MISS * dof.start_deviation));
+        let start = self.dofs.map(|dof| dof.start_deviation);
+        self.estimate.loosen(
+            start.map(|start| MISS * start),
+            start.map(|start| MISSED * start),
+        );
     }
 
     fn reset_prediction(&mut self, _: &Entry<N>) {
-        self.estimate
-            .loosen(self.dofs.map(|dof| dof.start_deviation));
+        let start = self.dofs.map(|dof| dof.start_deviation);
+        self.estimate.loosen(start, [f64::INFINITY; N]);
     }
 }
 

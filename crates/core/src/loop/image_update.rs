@@ -14,7 +14,7 @@ use crate::r#loop::report::{GeometryEstimate, Report, Status};
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};
-use crate::supervision::reactions::{Reaction, Source};
+use crate::supervision::reactions::Reaction;
 
 /// Result of an update by a measurement, of which the sensor has the view `V`.
 pub(super) struct Outcome<const N: usize, V> {
@@ -52,7 +52,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let raised = self.monitors.excuse(raised, sensor);
         let fit = self.monitors.check_fit(sensor);
         let raised = raised.union(rate).union(fit);
-        self.monitors.update(Source::Frame, raised);
+        self.monitors.react_to_measurement(raised, sensor);
         outcome
     }
 

@@ -72,14 +72,16 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let age = settings.safety.frame_age;
         let is_known = age <= control.history;
         require(is_known, "frame_age", age, "at most control.history")?;
+        let mut dofs = settings.dofs;
         let (friction, gain) = if P::IS_COUPLED {
+            // The vector law bounds its commands itself: the reference may be as fast as they.
+            dofs.iter_mut().for_each(|dof| dof.gain_limit = 1.0);
             (settings.friction, [settings.law.free_gain; N])
         } else {
-            let own = settings.dofs.map(|dof| dof.gain_limit);
-            (Friction::independent(), own)
+            (Friction::independent(), dofs.map(|dof| dof.gain_limit))
         };
         let limiters = CommandLimiters::new(&settings.safety, gain, control.period, friction)?;
-        let monitors = Monitors::new(&settings.safety, &settings.dofs, control.period, limiters)?;
+        let monitors = Monitors::new(&settings.safety, &dofs, control.period, limiters)?;
         Ok(Self {
             profile: make(monitors.play_limits())?,
             view,

@@ -2,7 +2,7 @@
 
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::zip_with;
+use crate::dof::{all_finite, zip_with};
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
@@ -53,6 +53,8 @@ pub struct Monitors<const N: usize> {
     frames: [FrameGate<N>; SENSORS],
     rates: [FrameRate; SENSORS],
     fits: [SensorFit; SENSORS],
+    /// The flags that the last measurement of each sensor raised, and when, in s.
+    raised: [(Flags, f64); SENSORS],
     motion: MotionMonitor<N>,
     start: StartCheck<N>,
     supervisor: Supervisor<N>,
@@ -97,6 +99,7 @@ impl<const N: usize> Monitors<N> {
             frames: [FrameGate::new(safety, dofs)?; SENSORS],
             rates: [FrameRate::NEW; SENSORS],
             fits: [SensorFit::NEW; SENSORS],
+            raised: [(Flags::NONE, f64::NEG_INFINITY); SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,
             start: StartCheck::new(dofs.map(|dof| dof.start_deviation)),
             supervisor: Supervisor::new(safety)?,
@@ -136,6 +139,7 @@ impl<const N: usize> Monitors<N> {
             travel: 0.0,
             raised: gated.raised.union(self.check_gap(time)),
             severe: gated.severe,
+            open: Flags::NONE,
         };
         for (increment, unit) in gated.increments.iter().zip(self.unit) {
             event.travel += increment.abs() / unit;
@@ -168,12 +172,18 @@ impl<const N: usize> Monitors<N> {
     ) {
         let before = law.command();
         let proposed = law.propose(reference);
+        // Without an answer the command rests; before the first command there is none to rest at.
+        let limit = |lawful| match limit(before, lawful) {
+            found if all_finite(found) => found,
+            _ if all_finite(before) => before,
+            _ => lawful,
+        };
         if self.off.contains(Flag::Monitor) {
-            law.commit(limit(before, proposed));
+            law.commit(limit(proposed));
             return;
         }
         let (lawful, mut results) = self.limiters.limit(reference, proposed);
-        let limited = limit(before, lawful);
+        let limited = limit(lawful);
         self.limiters.continue_from(limited, &mut results);
         law.commit(limited);
         let mut shifts = [0.0; N];
@@ -362,17 +372,34 @@ impl<const N: usize> Monitors<N> {
 
     /// Raise a flag of the rig.
     pub fn raise(&mut self, flag: Flag) {
-        self.update(Source::Rig, self.enabled(Flags::of(flag)));
+        self.react(Source::Rig, self.enabled(Flags::of(flag)), Flags::NONE);
+    }
+
+    /// React to the flags that a measurement of one of the sensors raised.
+    pub(crate) fn react_to_measurement(&mut self, raised: Flags, sensor: usize) {
+        if let Some(last) = self.raised.get_mut(sensor) {
+            *last = (raised, self.time);
+        }
+        // A good measurement of one sensor does not clear what the last one of another has raised.
+        let since = self.time - self.gap;
+        let mut open = Flags::NONE;
+        for (other, (raised, at)) in self.raised.iter().enumerate() {
+            if other != sensor && *at >= since && *at <= self.time {
+                open = open.union(*raised);
+            }
+        }
+        self.react(Source::Frame, raised, open);
     }
 
     /// React to flags between two control ticks.
-    pub(crate) fn update(&mut self, source: Source, raised: Flags) {
+    fn react(&mut self, source: Source, raised: Flags, open: Flags) {
         self.supervisor.update(&Event {
             source,
             time: self.time,
             travel: 0.0,
             raised,
             severe: Flags::NONE,
+            open,
         });
     }
 

@@ -13,7 +13,8 @@ pub enum Reaction {
     HoldEstimate,
     /// R3: as R2, and reduce the compensation to nothing with motion.
     Fade,
-    /// R4: the command moves as the reference does, at a constant difference.
+    /// R4: no compensation: the command moves as the reference does, in `paper` at a constant difference, which `best` gives
+    /// back with motion.
     PassThrough,
     /// R5: hold the command; motion of the reference is discarded.
     HoldMotion,

@@ -18,6 +18,8 @@ pub struct Event {
     pub raised: Flags,
     /// The flags that go to their last level at once.
     pub severe: Flags,
+    /// The flags of which the event says nothing: another sensor raised them.
+    pub open: Flags,
 }
 
 /// Selects the reaction in force from the events so far, and from nothing else.
@@ -30,7 +32,7 @@ pub struct Event {
 /// lead <- lead + travel / restore_travel    while nothing more severe than a warning is in force
 /// ```
 ///
-/// is the share of the free gain in use, 0 to 1. It changes with motion only, never with time, so that nothing moves by
+/// is the share of the chosen compensation that is allowed, 0 to 1. It changes with motion only, never with time, so that nothing moves by
 /// itself; while the estimate or motion is held, it stays. Compensation returns without an acknowledgement, which only
 /// clears the list of warnings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +53,7 @@ pub struct Supervision {
     pub flags: Flags,
     /// The flags raised or escalated since the last acknowledgement.
     pub latched: Flags,
-    /// Share of the compensation in use, 0 to 1.
+    /// Share that the supervisor allows of the chosen compensation, 0 to 1.
     pub lead: f64,
 }
 
@@ -195,8 +197,12 @@ fn update_flag<const N: usize>(
             && now.level == level
         {
             now.good_events = 0;
-            // A clock that was set back restarts the hold.
-            now.since = now.since.min(time);
+            // A clock that was set back restarts the hold, and the first tick begins it.
+            now.since = if now.since.is_finite() {
+                now.since.min(time)
+            } else {
+                time
+            };
             return false;
         }
         *active = Some(ActiveFlag {
@@ -209,6 +215,7 @@ fn update_flag<const N: usize>(
     }
     if let Some(now) = active
         && event.source == rule.source
+        && !event.open.contains(rule.flag)
     {
         let needed = match rule.source {
             Source::Frame => settings.good_frames,
@@ -231,7 +238,8 @@ impl ActiveFlag {
         time: f64,
         travel: f64,
     ) -> usize {
-        let is_over = time - self.since >= settings.hold_time
+        // Before the first tick there is no time.
+        let is_over = self.since.is_finite() && time - self.since >= settings.hold_time
             || travel - self.since_travel >= settings.hold_travel;
         if rule.escalates && is_over {
             (self.level + 1).min(rule.levels.len() - 1)

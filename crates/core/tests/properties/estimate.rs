@@ -12,9 +12,9 @@ use crate::model::slack::{GAINS, Slack};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-use super::config;
 use super::guarantees::Random;
 use super::support::{safety, settings};
+use super::{close, config};
 
 /// Expected width of the slack, the unit of the DOF that it makes, and the standard deviation of the measured tip.
 const EXPECTED: f64 = 8e-3;
@@ -229,6 +229,47 @@ proptest! {
             prop_assert!((least - 1e-9..=most + 1e-9).contains(&gain), "{gain}");
             prop_assert!(direct.slack().half_width >= 0.0);
         }
+    }
+}
+
+/// However long nothing is measured, an offset gets no less certain than it may.
+#[test]
+fn an_offset_is_loosened_up_to_a_limit() {
+    let mut direct = Direct::new();
+    // At rest in the origin the tip is hardly more than the offset.
+    let std = |direct: &Direct| {
+        let [noise] = direct.estimate.noise();
+        let variance = direct.estimate.prior(&Plays::REST).covariance.trace();
+        (variance - noise * noise).sqrt() / UNIT
+    };
+    let mut loosened = |std_in_units: f64, most: f64| {
+        for _ in 0..10_000 {
+            let std = [std_in_units * UNIT];
+            direct.estimate.loosen(std, [most * UNIT]);
+        }
+        std(&direct)
+    };
+    assert!((1.5..1.52).contains(&loosened(0.03, 1.5)));
+    // What is less certain already stays.
+    let wide = loosened(0.03, f64::INFINITY);
+    assert!(wide > 3.0 && close(loosened(0.03, 1.5), wide));
+}
+
+/// Initial offsets far beyond the expected width still make a tip.
+#[test]
+fn the_tip_is_finite_for_any_start() {
+    for half_width in [0.0, 1e-6, 1.0, 9.0, 1e3, 1e9] {
+        let transmission = Transmission::new(Friction::independent(), [UNIT]).unwrap();
+        let own = settings(&safety()).estimation;
+        let start = Slack {
+            half_width: half_width * UNIT,
+            ..Slack::default()
+        };
+        let made = Estimate::<1, 0, COEFFICIENTS>::new(own, transmission, [], &[start], [UNIT]);
+        let mut estimate = made.unwrap();
+        estimate.origin = [ORIGIN];
+        let [tip] = estimate.tip(&Plays::REST);
+        assert!(tip.is_finite(), "{half_width}: {tip}");
     }
 }
 

@@ -27,6 +27,20 @@ fn filled(span: f64, ticks: u32) -> History<Vec<Entry>> {
     history
 }
 
+#[test]
+fn a_full_ring_covers_less_than_the_span_where_ticks_are_faster() {
+    for share in [0.2, 0.5, 1.0, 2.0] {
+        let storage = vec![Entry::BLANK; history_entries(5.0, PERIOD)];
+        let mut history = History::new(5.0, PERIOD, storage).unwrap();
+        for tick in 0..6000 {
+            history.push(entry(f64::from(tick) * share * PERIOD));
+        }
+        let (newest, covered) = (history.newest_time(), history.covered());
+        assert!(history.at(newest - covered).is_some());
+        assert!(close(covered, (5.0_f64).min(1001.0 * share * PERIOD)));
+    }
+}
+
 proptest! {
     #![proptest_config(config())]
 

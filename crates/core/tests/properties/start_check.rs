@@ -10,13 +10,26 @@ const DEVIATION: f64 = 0.25;
 
 /// Whether the check finds a tip behind slack `width` that moves by `gain` times its command, in sines of an amplitude, with noise.
 fn is_found(width: f64, gain: f64, amplitude: f64, noise: &[f64]) -> bool {
+    is_found_with(&[], width, gain, amplitude, noise)
+}
+
+/// The same with some measurements, by their number, replaced.
+fn is_found_with(
+    replaced: &[(u32, f64)],
+    width: f64,
+    gain: f64,
+    amplitude: f64,
+    noise: &[f64],
+) -> bool {
     let mut check = StartCheck::new([DEVIATION]);
     let mut output: f64 = 0.0;
     let mut found = false;
     for (tick, noise) in (0_u32..).zip(noise.iter().cycle().take(1000)) {
         let command = amplitude * (f64::from(tick) / 100.0).sin();
         output = output.clamp(command - width / 2.0, command + width / 2.0);
-        found |= check.update([command], [3.0 + gain * output + noise]);
+        let other = replaced.iter().find(|(at, _)| *at == tick);
+        let tip = other.map_or(3.0 + gain * output + noise, |(_, tip)| *tip);
+        found |= check.update([command], [tip]);
     }
     found
 }
@@ -33,6 +46,20 @@ proptest! {
     ) {
         prop_assert!(!is_found(width, gain, amplitude, &noise));
         prop_assert!(is_found(width, -gain, amplitude, &noise));
+    }
+
+    #[test]
+    fn what_a_tracker_gives_without_a_tool_hides_no_direction(
+        width in 0.0..2.0 * DEVIATION,
+        start in 0_u32..40,
+        count in 1_u32..15,
+        value in prop_oneof![Just(-9999.0), Just(-3.7e28), -500.0..-30.0],
+        noise in prop::collection::vec(-0.1 * DEVIATION..0.1 * DEVIATION, 97),
+    ) {
+        let replaced: Vec<_> = (start..start + count).map(|at| (at, value)).collect();
+        let amplitude = 4.0 * DEVIATION;
+        prop_assert!(is_found_with(&replaced, width, -1.0, amplitude, &noise));
+        prop_assert!(!is_found_with(&replaced, width, 1.0, amplitude, &noise));
     }
 
     #[test]

@@ -20,6 +20,7 @@ fn event(source: Source, time: f64, travel: f64, raised: Flags) -> Event {
         travel,
         raised,
         severe: Flags::NONE,
+        open: Flags::NONE,
     }
 }
 
@@ -62,6 +63,7 @@ fn apply(supervisor: &mut Supervisor<3>, now: &mut f64, action: &Action, more: F
                 travel: *travel,
                 raised: raised.union(more),
                 severe: *severe,
+                open: Flags::NONE,
             });
         }
         Action::Engage => supervisor.engage(),
@@ -110,6 +112,7 @@ fn every_level_is_reached_and_cleared_as_the_table_says() {
                     travel: 0.0,
                     raised: flag,
                     severe,
+                    open: Flags::NONE,
                 });
                 now += 4.0;
             }
@@ -212,6 +215,39 @@ fn a_hold_ends_on_its_bound() {
         supervisor.update(&event(Source::Frame, time, travel, frozen));
         assert_eq!(supervisor.now().reaction, expected, "{time} s, {travel}");
     }
+}
+
+/// A flag of the rig before the first tick, which has no time.
+#[test]
+fn a_hold_that_begins_before_the_first_tick_counts_from_the_next_event() {
+    let (fault, hold) = (Flags::of(Flag::DriveFault), safety().hold_time);
+    let mut supervisor = supervisor();
+    for (time, expected) in [
+        (f64::NAN, Reaction::QuickStop),
+        (5.0, Reaction::QuickStop),
+        (5.0 + hold, Reaction::Disable),
+    ] {
+        supervisor.update(&event(Source::Rig, time, 0.0, fault));
+        assert_eq!(supervisor.now().reaction, expected, "{time} s");
+    }
+}
+
+#[test]
+fn an_event_that_says_nothing_of_a_flag_does_not_clear_it() {
+    let frozen = Flags::of(Flag::Frozen);
+    let mut supervisor = supervisor();
+    supervisor.update(&event(Source::Frame, 0.0, 0.0, frozen));
+    for _ in 0..100 {
+        supervisor.update(&Event {
+            open: frozen,
+            ..event(Source::Frame, 1.0, 0.0, Flags::NONE)
+        });
+    }
+    assert_eq!(supervisor.now().flags, frozen);
+    for _ in 0..safety().good_frames {
+        supervisor.update(&event(Source::Frame, 1.0, 0.0, Flags::NONE));
+    }
+    assert!(supervisor.now().flags.is_empty());
 }
 
 #[test]

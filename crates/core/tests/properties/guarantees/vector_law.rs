@@ -93,7 +93,8 @@ impl CheckedLaw {
         self.estimate
             .update(plays, &measurement, 0.0, random.below(4) == 0);
         if random.below(50) == 0 {
-            self.estimate.loosen(dofs().map(|dof| dof.start_deviation));
+            self.estimate
+                .loosen(dofs().map(|dof| dof.start_deviation), [f64::INFINITY; 3]);
         }
     }
 
