@@ -51,8 +51,9 @@ def test_a_channel_can_be_used_after_a_file_in_its_place_is_gone(tmp_path: Path)
     config = serial_config(tmp_path)
     channel = Path(config.channel)
     channel.write_text("")
-    with pytest.raises(ConfigError, match="a link that can be made"):
-        SimulatedMicrocontroller(config)
+    board = SimulatedMicrocontroller(config)
+    with pytest.raises(ConfigError, match="a link that can be made"), board:
+        pass
     channel.unlink()
     with SimulatedMicrocontroller(config):
         assert channel.is_symlink()
@@ -60,6 +61,28 @@ def test_a_channel_can_be_used_after_a_file_in_its_place_is_gone(tmp_path: Path)
 
 def test_motors_follow_in_si_units(tmp_path: Path) -> None:
     follow_in_si_units(SimulatedMicrocontroller, serial_config(tmp_path), START)
+
+
+def test_each_of_set_points_that_are_read_together_moves_the_motors(tmp_path: Path) -> None:
+    demands: list[float] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand[Dof.ROTATION])
+        return demand
+
+    motors = SimulatedMicrocontroller(serial_config(tmp_path), plant, start=START)
+    motors.board.state, motors.board.watchdog = State.ENABLED, 1000
+    targets = range(760, 950, 10)  # counts of axis 1, which is at 750
+    for number, target in enumerate(targets):
+        motors._buffer += frames.request(
+            Request.SETPOINTS, number, frames.setpoints([target, 0, 0])
+        )
+    motors._process(0.0)
+    answers = bytearray().join(answer for _, _, answer in sorted(motors._queued))
+    found = [frames.read_status(each, 3).positions[0] for each in frames.take_messages(answers)]  # type: ignore[union-attr]
+    assert found == [750, *targets[:-1]]
+    count = 1 / motors._config.rotation.counts_per_unit
+    assert demands == pytest.approx([at * count for at in targets[:-1]])
 
 
 @pytest.mark.parametrize(
@@ -169,6 +192,20 @@ def test_unplugged_port_is_a_bus_error(tmp_path: Path) -> None:
         with pytest.raises(BusError, match="connection is lost") as found:
             drive(drives, 10_000)
         assert "quick stop is not confirmed" in str(found.value.__notes__)
+
+
+def test_an_adapter_can_be_unplugged_twice_and_plugged_in_again(tmp_path: Path) -> None:
+    config = serial_config(tmp_path)
+    with SimulatedMicrocontroller(config, start=START) as board:
+        for dof in (Dof.BENDING, Dof.BENDING, Dof.ROTATION):
+            board.inject("unplug", dof)
+        board.clear(Dof.BENDING)
+        until(lambda: not (board._requests or board._faults[Dof.BENDING]))
+        assert not Path(config.channel).exists()  # rotation's is still unplugged
+        board.clear(Dof.ROTATION)
+        until(Path(config.channel).exists)
+        with open_drives(config) as drives:
+            np.testing.assert_allclose(drives.start(), START, atol=2e-3)
 
 
 def test_stopped_released_and_disabled(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from paced_motion import drive, follow_in_si_units, running_line
 from servo_settings import AXES, MODELS, START, servos_config, servos_document
+from tautscope.bench.servo_packets import BROADCAST, READ, SYNC_WRITE, Packet
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
@@ -50,6 +51,38 @@ def test_motors_follow_in_si_units_over_several_turns(protocol: str, tmp_path: P
     servos = follow_in_si_units(SimulatedServos, servos_config(protocol, tmp_path), START)
     until(lambda: goals_are_positions(servos))
     assert [one.what for one in servos.events] == ["torque on"] * 3  # and held
+
+
+@FAMILIES
+def test_of_packets_that_are_read_together_each_moves_the_servos_and_the_last_is_answered(
+    protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demands: list[float] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand[Dof.INSERTION])
+        return demand
+
+    config = servos_config(protocol, tmp_path)
+    motors = SimulatedServos(config, plant, start=START)
+    servo, word = motors.servos[Dof.INSERTION], 2 if protocol == "dynamixel" else 1
+    servo.write(servo.family.torque.address, b"\1", 0.0)
+    goal, position = servo.family.goal, servo.family.position
+    goals = [servo.get(goal) + step for step in range(2, 20, 2)]  # counts
+    read = [*position.address.to_bytes(word, "little"), *position.size.to_bytes(word, "little")]
+    together = []
+    for each in goals:
+        place = goal.address.to_bytes(word, "little") + goal.size.to_bytes(word, "little")
+        data = place + bytes([servo.id]) + goal.encode(each)
+        together += [Packet(BROADCAST, SYNC_WRITE, data, True, 20)]
+        together += [Packet(servo.id, READ, bytes(read), True, 20)]
+    monkeypatch.setattr(motors._codec, "split", lambda buffer: together)
+    motors._process(0.0)
+    count = 1 / config.insertion.counts_per_unit
+    moved = [START[Dof.INSERTION] + step * count for step in range(2, 18, 2)]
+    assert demands == pytest.approx(moved, abs=count / 2)
+    ((_, _, answer),) = motors._queued
+    assert position.encode(goals[-2]) in answer
 
 
 @FAMILIES
