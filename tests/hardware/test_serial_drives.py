@@ -1,7 +1,9 @@
 """Motors behind a microcontroller: units, limits; faults end in a named error and a stop."""
 
 import os
+import re
 import termios
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import serial
+from common.paths import ROOT
 from paced_motion import drive, follow_in_si_units, running_line
 from serial_settings import AXES, serial_config, serial_document
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
@@ -20,15 +23,19 @@ from tautscope.errors import (
     ConfigError,
     DriveError,
     EmergencyError,
+    FieldError,
     FollowingError,
     ModeRefusedError,
     SecondMasterError,
     SettingRefusedError,
+    SignalError,
     SilentDriveError,
     StateError,
 )
 from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.drives import Drives, open_drives
+from tautscope.hardware.jog import jog
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import Refusal, Request, State
 from tautscope.hardware.serial_line.line import open_port
@@ -136,12 +143,68 @@ def test_killed_host_is_stopped_by_the_watchdog(tmp_path: Path) -> None:
             output._queue.get(timeout=TIMEOUT)  # it moves
             with pytest.raises(SecondMasterError):
                 open_drives(config.drives)
-            (finding,) = check_drives(config.drives)  # which takes no lock of the rig
-            assert "no other program has the port" in finding.todo
+            (finding,) = check_drives(config.drives)
+            assert "another program commands these drives" in finding.found
             master.kill()
             master.wait(TIMEOUT)
         until(lambda: board.board.state == State.SILENCE)
         assert is_at_rest(board)
+
+
+def test_the_code_of_the_page_keeps_the_pace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (ROOT / "docs" / "hardware.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    config, requests = serial_config(tmp_path), list[float]()
+    document = {"drives": serial_document(tmp_path)}
+    (tmp_path / "rig.toml").write_text(dump_config(from_document(document)), encoding="utf-8")
+    exchange = SerialDrives.exchange
+
+    def note(drives: SerialDrives, targets: list[int]) -> list[Feedback]:
+        requests.append(time.monotonic())
+        return exchange(drives, targets)
+
+    monkeypatch.setattr(SerialDrives, "exchange", note)
+    monkeypatch.chdir(tmp_path)
+    with SimulatedMicrocontroller(config, start=START):
+        exec(code, {})
+    assert len(requests) > 10
+    # The first is of the start.
+    assert requests[-1] - requests[0] >= (len(requests) - 2) * config.cycle - 1e-6
+
+
+def test_a_pause_before_the_start_is_none_of_the_computer(tmp_path: Path) -> None:
+    with running(serial_config(tmp_path, heartbeat_timeout=0.2)) as (board, drives):
+        drives.exchange(drives.last_command)
+        drives.stop()
+        time.sleep(0.4)
+        board.inject("fault", Dof.BENDING)
+        until(lambda: any(board.board.faults))
+        with pytest.raises(StateError, match="driver") as found:
+            drives.start()
+    assert not hasattr(found.value, "__notes__")
+
+
+def test_a_command_beyond_a_limit_is_shown_as_a_number(tmp_path: Path) -> None:
+    with running(serial_config(tmp_path)) as (_, drives), pytest.raises(SignalError) as found:
+        drives.exchange(drives.last_command + np.array([1.0, 0.0, 0.0]))
+    assert str(found.value).startswith("command[insertion]: got 1.0, expected -0.05 to 0.08")
+
+
+def test_a_jog_beyond_the_travel_is_refused_where_the_motor_is(tmp_path: Path) -> None:
+    demands: list[np.ndarray] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand)
+        return demand
+
+    at = np.array([0.0792, 1.5, 0.5])
+    config = serial_config(tmp_path)
+    told = pytest.raises(FieldError, match=r"distance: got 0.002, .* is at 0\.0792 m")
+    with SimulatedMicrocontroller(config, plant, start=at), told:
+        jog(config, Dof.INSERTION, 2e-3)
+    np.testing.assert_array_equal(demands, [demands[0]] * len(demands))
 
 
 def test_host_that_hangs_is_stopped_by_the_watchdog(tmp_path: Path) -> None:
