@@ -55,6 +55,12 @@ def verbs() -> dict[str, argparse.ArgumentParser]:
     return found
 
 
+def test_the_help_of_each_command_that_takes_a_rig_says_that_it_moves() -> None:
+    of_rigs = {words: each for words, each in verbs().items() if "--rig" in each.format_usage()}
+    assert {"run", "jog", "doctor"} <= set(of_rigs)
+    assert [words for words, each in of_rigs.items() if "MOVE" not in each.format_help()] == []
+
+
 @pytest.mark.parametrize(
     ("words", "option"),
     [

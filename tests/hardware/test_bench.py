@@ -120,6 +120,14 @@ def test_bench_refuses_a_hardware_configuration(
         Bench(bench_config(tmp_path, **changes))
 
 
+def test_a_mode_that_cia_402_does_not_have_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["bench", "--modes", "0"])
+    assert "--modes: invalid choice: 0" in capsys.readouterr().err
+
+
 def test_error_names_a_socket_that_cannot_be_made(tmp_path: Path) -> None:
     config = bench_config(tmp_path)
     with (

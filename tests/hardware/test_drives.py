@@ -25,7 +25,7 @@ def test_motors_follow_in_si_units(
         return targets
 
     config = drives_config(channel=str(hub.path))
-    rig = bench(config, plant, start=START, modes=(mode,))
+    rig = bench(config, plant, start=START, modes=(mode, mode))
     with open_drives(config) as drives:
         assert {one.mode for one in drives.commissioned} == {Mode(mode)}
         position = drives.start()

@@ -14,22 +14,28 @@ import numpy as np
 import pytest
 from drive_settings import AXES, drives_config
 from tautscope.bench.drives import SimulatedDrive
-from tautscope.config import DrivesConfig
+from tautscope.config import Config, DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
     EmergencyError,
     ModeRefusedError,
+    SecondMasterError,
     SettingRefusedError,
     SilentDriveError,
     StateError,
     may_move,
 )
+from tautscope.hardware import drives as drives_module
+from tautscope.hardware import serial_numbers as serial_numbers_module
 from tautscope.hardware.cia402 import STOPPED_STATES, Mode, State
 from tautscope.hardware.cia402_drives import Cia402Drives
-from tautscope.hardware.drives import Drives
+from tautscope.hardware.doctor import drives as doctor_module
+from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus
 from tautscope.hardware.rig_lock import RigLock
+from tautscope.hardware.serial_numbers import read_serial_numbers
 
 INIT, PREOP, SAFEOP, OP = 1, 2, 4, 8
 
@@ -335,6 +341,27 @@ def test_a_stop_that_is_not_confirmed_is_told_though_the_adapter_fails(
     assert may_move(found.value)
     with RigLock(config):
         pass
+
+
+def test_doctor_leaves_drives_that_run_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    soem, master, config = line()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for module in (drives_module, doctor_module, serial_numbers_module):
+        monkeypatch.setattr(
+            module, "open_group", lambda of: Cia402Drives(of, EthercatFieldbus(of, soem))
+        )
+    with open_drives(config) as drives:
+        start = drives.start()
+        (finding,) = check_drives(config)
+        assert (finding.status, "another program commands" in finding.found) == ("missing", True)
+        with pytest.raises(SecondMasterError):
+            read_serial_numbers(Config(drives=config))
+        np.testing.assert_allclose(drives.exchange(start), start, atol=1e-4)
+        assert states(master) == {State.OPERATION_ENABLED}
+        assert {slave.state for slave in master.slaves} == {OP}
+    assert {finding.status for finding in check_drives(config)} <= {"ok", "note"}
 
 
 def test_faults_of_all_drives_are_reset_at_once() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from common.paths import ROOT
 from drive_settings import drives_document
-from servo_settings import MODELS, TIMES
+from servo_settings import MODELS, START, TIMES, servos_document
 from tautscope import Tip, run_experiment
 from tautscope.bench.any_motors import make_motors
 from tautscope.cli import main
@@ -134,8 +134,23 @@ def test_a_command_has_a_number_per_motor(tmp_path: Path) -> None:
         rig = Arm(config)
         try:
             rig.reset()
-            with pytest.raises(SignalError, match="2 finite numbers"):
-                rig.step(np.zeros(3))
+            for wrong in (np.zeros(3), ["a", 0.0], [[0.0], [1.0, 2.0]]):
+                with pytest.raises(SignalError, match="2 finite numbers"):
+                    rig.step(wrong)
+                rig.reset()
+        finally:
+            rig.close()
+
+
+def test_the_articles_motors_stay_where_they_are(tmp_path: Path) -> None:
+    drives = servos_document("dynamixel", tmp_path)
+    config = from_document({"drives": drives, "control": {"period": drives["cycle"]}})
+    with ExitStack() as stack:
+        assert config.drives is not None
+        stack.enter_context(make_motors(config.drives, stack, start=START))
+        rig = MotorRig(config)
+        try:
+            assert rig.reset().applied == pytest.approx(START, abs=2e-3)
         finally:
             rig.close()
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from drive_settings import drives_document
+from serial_settings import serial_document
 from tautscope.config import dump_config, from_document, load_config
 from waiting import TIMEOUT
 
@@ -98,6 +99,28 @@ def test_a_wrong_request_is_told_and_the_next_is_served(
     print("\nmelt rotation\nfreeze tail\nfreeze", file=bench.stdin)
     print("freeze rotation", file=bench.stdin, flush=True)
     lines.until("fault: freeze")
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "message"),
+    [
+        ({}, ("--start", "0", "0"), "--start: got [0.0, 0.0], expected 3 positions"),
+        ({"protocol": "serial", "channel": "/dev/ttyACM0"}, (), "drives.channel: got '/dev/tty"),
+        (None, (), "File not found"),
+    ],
+)
+def test_bad_input_ends_simulated_motors_with_one_line(
+    changes: dict[str, Any] | None, arguments: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "rig.toml"
+    if changes is not None:
+        document = serial_document(tmp_path, **changes) if changes else drives_document()
+        file.write_text(dump_config(from_document({"drives": document})), encoding="utf-8")
+    options = ("-m", "tautscope.bench.any_motors", "--config", str(file), *arguments)
+    with process(*options) as (motors, _):
+        assert motors.wait(TIMEOUT) == 2
+        (line,) = motors.stderr.read().splitlines()
+    assert line.startswith(f"error: {message}")
 
 
 MASTER = str(Path(__file__).with_name("master.py"))

@@ -1,7 +1,9 @@
 """Motors behind a microcontroller: units, limits; faults end in a named error and a stop."""
 
 import os
+import re
 import termios
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import serial
+from common.paths import ROOT
 from paced_motion import drive, follow_in_si_units, running_line
 from serial_settings import AXES, serial_config, serial_document
 from tautscope.bench.microcontroller import SimulatedMicrocontroller
@@ -20,15 +23,19 @@ from tautscope.errors import (
     ConfigError,
     DriveError,
     EmergencyError,
+    FieldError,
     FollowingError,
     ModeRefusedError,
     SecondMasterError,
     SettingRefusedError,
+    SignalError,
     SilentDriveError,
     StateError,
 )
 from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.drives import Drives, open_drives
+from tautscope.hardware.jog import jog
 from tautscope.hardware.serial_line import frames
 from tautscope.hardware.serial_line.frames import Refusal, Request, State
 from tautscope.hardware.serial_line.line import open_port
@@ -51,8 +58,9 @@ def test_a_channel_can_be_used_after_a_file_in_its_place_is_gone(tmp_path: Path)
     config = serial_config(tmp_path)
     channel = Path(config.channel)
     channel.write_text("")
-    with pytest.raises(ConfigError, match="a link that can be made"):
-        SimulatedMicrocontroller(config)
+    board = SimulatedMicrocontroller(config)
+    with pytest.raises(ConfigError, match="a link that can be made"), board:
+        pass
     channel.unlink()
     with SimulatedMicrocontroller(config):
         assert channel.is_symlink()
@@ -60,6 +68,28 @@ def test_a_channel_can_be_used_after_a_file_in_its_place_is_gone(tmp_path: Path)
 
 def test_motors_follow_in_si_units(tmp_path: Path) -> None:
     follow_in_si_units(SimulatedMicrocontroller, serial_config(tmp_path), START)
+
+
+def test_each_of_set_points_that_are_read_together_moves_the_motors(tmp_path: Path) -> None:
+    demands: list[float] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand[Dof.ROTATION])
+        return demand
+
+    motors = SimulatedMicrocontroller(serial_config(tmp_path), plant, start=START)
+    motors.board.state, motors.board.watchdog = State.ENABLED, 1000
+    targets = range(760, 950, 10)  # counts of axis 1, which is at 750
+    for number, target in enumerate(targets):
+        motors._buffer += frames.request(
+            Request.SETPOINTS, number, frames.setpoints([target, 0, 0])
+        )
+    motors._process(0.0)
+    answers = bytearray().join(answer for _, _, answer in sorted(motors._queued))
+    found = [frames.read_status(each, 3).positions[0] for each in frames.take_messages(answers)]  # type: ignore[union-attr]
+    assert found == [750, *targets[:-1]]
+    count = 1 / motors._config.rotation.counts_per_unit
+    assert demands == pytest.approx([at * count for at in targets[:-1]])
 
 
 @pytest.mark.parametrize(
@@ -113,12 +143,68 @@ def test_killed_host_is_stopped_by_the_watchdog(tmp_path: Path) -> None:
             output._queue.get(timeout=TIMEOUT)  # it moves
             with pytest.raises(SecondMasterError):
                 open_drives(config.drives)
-            (finding,) = check_drives(config.drives)  # which takes no lock of the rig
-            assert "no other program has the port" in finding.todo
+            (finding,) = check_drives(config.drives)
+            assert "another program commands these drives" in finding.found
             master.kill()
             master.wait(TIMEOUT)
         until(lambda: board.board.state == State.SILENCE)
         assert is_at_rest(board)
+
+
+def test_the_code_of_the_page_keeps_the_pace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (ROOT / "docs" / "hardware.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    config, requests = serial_config(tmp_path), list[float]()
+    document = {"drives": serial_document(tmp_path)}
+    (tmp_path / "rig.toml").write_text(dump_config(from_document(document)), encoding="utf-8")
+    exchange = SerialDrives.exchange
+
+    def note(drives: SerialDrives, targets: list[int]) -> list[Feedback]:
+        requests.append(time.monotonic())
+        return exchange(drives, targets)
+
+    monkeypatch.setattr(SerialDrives, "exchange", note)
+    monkeypatch.chdir(tmp_path)
+    with SimulatedMicrocontroller(config, start=START):
+        exec(code, {})
+    assert len(requests) > 10
+    # The first is of the start.
+    assert requests[-1] - requests[0] >= (len(requests) - 2) * config.cycle - 1e-6
+
+
+def test_a_pause_before_the_start_is_none_of_the_computer(tmp_path: Path) -> None:
+    with running(serial_config(tmp_path, heartbeat_timeout=0.2)) as (board, drives):
+        drives.exchange(drives.last_command)
+        drives.stop()
+        time.sleep(0.4)
+        board.inject("fault", Dof.BENDING)
+        until(lambda: any(board.board.faults))
+        with pytest.raises(StateError, match="driver") as found:
+            drives.start()
+    assert not hasattr(found.value, "__notes__")
+
+
+def test_a_command_beyond_a_limit_is_shown_as_a_number(tmp_path: Path) -> None:
+    with running(serial_config(tmp_path)) as (_, drives), pytest.raises(SignalError) as found:
+        drives.exchange(drives.last_command + np.array([1.0, 0.0, 0.0]))
+    assert str(found.value).startswith("command[insertion]: got 1.0, expected -0.05 to 0.08")
+
+
+def test_a_jog_beyond_the_travel_is_refused_where_the_motor_is(tmp_path: Path) -> None:
+    demands: list[np.ndarray] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand)
+        return demand
+
+    at = np.array([0.0792, 1.5, 0.5])
+    config = serial_config(tmp_path)
+    told = pytest.raises(FieldError, match=r"distance: got 0.002, .* is at 0\.0792 m")
+    with SimulatedMicrocontroller(config, plant, start=at), told:
+        jog(config, Dof.INSERTION, 2e-3)
+    np.testing.assert_array_equal(demands, [demands[0]] * len(demands))
 
 
 def test_host_that_hangs_is_stopped_by_the_watchdog(tmp_path: Path) -> None:
@@ -169,6 +255,20 @@ def test_unplugged_port_is_a_bus_error(tmp_path: Path) -> None:
         with pytest.raises(BusError, match="connection is lost") as found:
             drive(drives, 10_000)
         assert "quick stop is not confirmed" in str(found.value.__notes__)
+
+
+def test_an_adapter_can_be_unplugged_twice_and_plugged_in_again(tmp_path: Path) -> None:
+    config = serial_config(tmp_path)
+    with SimulatedMicrocontroller(config, start=START) as board:
+        for dof in (Dof.BENDING, Dof.BENDING, Dof.ROTATION):
+            board.inject("unplug", dof)
+        board.clear(Dof.BENDING)
+        until(lambda: not (board._requests or board._faults[Dof.BENDING]))
+        assert not Path(config.channel).exists()  # rotation's is still unplugged
+        board.clear(Dof.ROTATION)
+        until(Path(config.channel).exists)
+        with open_drives(config) as drives:
+            np.testing.assert_allclose(drives.start(), START, atol=2e-3)
 
 
 def test_stopped_released_and_disabled(tmp_path: Path) -> None:

@@ -156,14 +156,27 @@ def test_the_console_enables_and_stops_motors(
             control.shut_down()
 
 
+def test_a_bench_without_a_socket_of_images_leaves_nothing_behind(tmp_path: Path) -> None:
+    config = bench_config("serial", tmp_path)
+    notes = tmp_path / "notes.txt"
+    notes.write_text("mine", encoding="utf-8")
+    for place in (notes, tmp_path / "none" / "video"):
+        bench = Bench(config.replace(**{"camera.source.url": f"unix:{place}"}))
+        with pytest.raises(ConfigError, match=r"camera\.source\.url"), bench:
+            pass
+    assert notes.read_text(encoding="utf-8") == "mine"
+    with Bench(config):
+        assert Path(require_drives(config).channel).is_symlink()
+
+
 def test_the_bench_is_no_device_and_survives_the_end_of_another(tmp_path: Path) -> None:
     config = bench_config("feetech", tmp_path)
     with pytest.raises(ConfigError, match=r"drives\.channel.*no device"):
         Bench(config.replace(**{"drives.channel": "/dev/ttyACM0"}))
     assert config.drives is not None
     with running_bench(config, tmp_path) as (_, bench, _):
-        with pytest.raises(ConfigError, match="another bench"):
-            SimulatedServos(config.drives)
+        with pytest.raises(ConfigError, match="another bench"), SimulatedServos(config.drives):
+            pass
         bench.send_signal(signal.SIGKILL)
         bench.wait(TIMEOUT)
     with SimulatedServos(config.drives) as servos:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from paced_motion import drive, follow_in_si_units, running_line
 from servo_settings import AXES, MODELS, START, servos_config, servos_document
+from tautscope.bench.servo import SimulatedServo
+from tautscope.bench.servo_packets import BROADCAST, READ, SYNC_WRITE, Packet
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import dump_config, from_document
 from tautscope.dof import Dof
@@ -27,6 +29,7 @@ from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.servos.families import Register
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
 from tautscope.hardware.servos.servo import Servo
+from tautscope.hardware.servos.servo_drives import ServoDrives
 from test_processes import MASTER, process
 from waiting import TIMEOUT, until
 
@@ -50,6 +53,38 @@ def test_motors_follow_in_si_units_over_several_turns(protocol: str, tmp_path: P
     servos = follow_in_si_units(SimulatedServos, servos_config(protocol, tmp_path), START)
     until(lambda: goals_are_positions(servos))
     assert [one.what for one in servos.events] == ["torque on"] * 3  # and held
+
+
+@FAMILIES
+def test_of_packets_that_are_read_together_each_moves_the_servos_and_the_last_is_answered(
+    protocol: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demands: list[float] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand[Dof.INSERTION])
+        return demand
+
+    config = servos_config(protocol, tmp_path)
+    motors = SimulatedServos(config, plant, start=START)
+    servo, word = motors.servos[Dof.INSERTION], 2 if protocol == "dynamixel" else 1
+    servo.write(servo.family.torque.address, b"\1", 0.0)
+    goal, position = servo.family.goal, servo.family.position
+    goals = [servo.get(goal) + step for step in range(2, 20, 2)]  # counts
+    read = [*position.address.to_bytes(word, "little"), *position.size.to_bytes(word, "little")]
+    together = []
+    for each in goals:
+        place = goal.address.to_bytes(word, "little") + goal.size.to_bytes(word, "little")
+        data = place + bytes([servo.id]) + goal.encode(each)
+        together += [Packet(BROADCAST, SYNC_WRITE, data, True, 20)]
+        together += [Packet(servo.id, READ, bytes(read), True, 20)]
+    monkeypatch.setattr(motors._codec, "split", lambda buffer: together)
+    motors._process(0.0)
+    count = 1 / config.insertion.counts_per_unit
+    moved = [START[Dof.INSERTION] + step * count for step in range(2, 18, 2)]
+    assert demands == pytest.approx(moved, abs=count / 2)
+    ((_, _, answer),) = motors._queued
+    assert position.encode(goals[-2]) in answer
 
 
 @FAMILIES
@@ -352,6 +387,63 @@ def test_doctor_finds_all_there_and_enables_nothing(protocol: str, tmp_path: Pat
     assert MODELS[protocol] in text
     assert "torque off; no fault" in text
     assert "°C" in text
+
+
+def test_doctor_finds_servos_that_answer_at_another_rate_missing(tmp_path: Path) -> None:
+    config = servos_config("dynamixel", tmp_path)
+    wrong = servos_config("dynamixel", tmp_path, bitrate=115_200, request_timeout=0.2)
+    with SimulatedServos(config, start=START):
+        found = check_drives(wrong)
+    assert [one.status for one in found] == ["ok", "missing", "missing", "missing"]
+    assert all("answer at 1000000 bit/s" in one.todo for one in found[1:])
+
+
+def test_a_servo_that_its_watchdog_stopped_does_not_move_before_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = {"model": MODELS["dynamixel"], "speed_limit": 0.1}
+    axes = {name: axis | slow for name, axis in AXES.items()}
+    config = servos_config("dynamixel", tmp_path, heartbeat_timeout=0.2, **axes)
+    demands: list[np.ndarray] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand)
+        return demand
+
+    write, moves = SimulatedServo.write, list[bool]()
+
+    def note(servo: SimulatedServo, *what: Any) -> int:
+        error = write(servo, *what)
+        family = servo.family
+        distance = abs(servo.get(family.goal) - servo.get(family.position))
+        is_on = servo.get(family.torque) and servo.get(family.watchdog) != 255  # type: ignore[arg-type]
+        moves.append(bool(is_on) and distance > 1)
+        return error
+
+    with SimulatedServos(config, plant, start=START) as motors:
+        killed = ServoDrives(config)
+        for dof in config.all_motors:
+            killed.commission(dof)
+        positions = killed.read_positions()
+        killed.start(positions)
+        killed.enable(reset_faults=False)
+        killed.exchange([position + 100_000 for position in positions])
+        killed.close()  # without a stop
+        until(lambda: sum(one.what == "bus watchdog" for one in motors.events) == 3)
+        assert not goals_are_positions(motors)
+        demands.clear()
+        monkeypatch.setattr(SimulatedServo, "write", note)
+        memory = [bytes(one.memory) for one in motors.servos]
+        findings = check_drives(config)
+        assert [bytes(one.memory) for one in motors.servos] == memory
+        assert {one.status for one in findings} == {"ok", "note"}
+        with open_drives(config) as drives:
+            drives.start()
+            drive(drives, 1, speed=np.zeros(3))
+        assert moves
+        assert not any(moves)
+        assert len(demands) > 1
+        np.testing.assert_allclose(demands, [demands[0]] * len(demands), atol=1e-9)
 
 
 def test_lost_answers_are_counted_for_the_servo_that_is_silent(tmp_path: Path) -> None:

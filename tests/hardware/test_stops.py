@@ -79,6 +79,15 @@ def test_stops_of_a_feetech_are_found(tmp_path: Path) -> None:
     assert (stops.lower, stops.upper) == pytest.approx((0.0, 0.004), abs=2 / 3e5)
 
 
+def test_stops_are_found_where_the_search_could_go_farther_than_the_servo_counts(
+    tmp_path: Path,
+) -> None:
+    config = rig("feetech", tmp_path, counts_per_unit=2e5, travel=[0.0, 0.06])
+    with between_stops(config, 0.01, stops=(0.009, 0.011)):
+        stops = find_stops(config, Dof.INSERTION, torque=0.3)
+    assert (stops.lower, stops.upper) == pytest.approx((0.009, 0.011), abs=2 / 2e5)
+
+
 def test_the_bench_has_the_stops_of_its_configuration(tmp_path: Path) -> None:
     at = rig("dynamixel", tmp_path, travel=[0.0, 0.04], stops=[-0.001, 0.041], speed_limit=0.5)
     assert at.drives is not None
@@ -134,10 +143,11 @@ def test_a_motor_pressed_into_its_stop_is_not_driven_through_its_travel(
 ) -> None:
     """It rested some counts deeper in it than the search finds it, which moves by 1.4 per cycle."""
     search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
+    reach = UPPER - LOWER
     drives = SoftStop("insertion, servo 1")
     monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
     begin = LOWER - give * COUNT
-    assert stops_module._seek_stop(search, Dof.INSERTION, -1, begin) == pytest.approx(LOWER)
+    assert stops_module._seek_stop(search, Dof.INSERTION, -1, begin, reach) == pytest.approx(LOWER)
     assert drives.highest == LOWER
 
 
@@ -159,5 +169,5 @@ def test_after_an_error_of_another_motor_or_an_unconfirmed_stop_nothing_moves(
     search = stops_module._search_config(rig("feetech", tmp_path), Dof.INSERTION, 0.3)
     monkeypatch.setattr(stops_module, "open_drives", lambda config: drives)
     with pytest.raises(FollowingError):
-        stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER)
+        stops_module._seek_stop(search, Dof.INSERTION, -1, LOWER, UPPER - LOWER)
     assert drives.starts == 1

@@ -7,6 +7,7 @@ events as JSON lines, and ends with its input, as ``tautscope bench``.
 
 import argparse
 import json
+import sys
 import time
 from contextlib import ExitStack
 
@@ -22,7 +23,7 @@ from tautscope.bench.requests import raise_errors_of_threads, serve_requests
 from tautscope.bench.servos import SimulatedServos
 from tautscope.config import DrivesConfig, load_config
 from tautscope.config.microcontroller import PROTOCOL, SERIAL_PORTS
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, TautscopeError
 from tautscope.hardware.signals import exit_on_signals
 
 
@@ -59,17 +60,29 @@ def make_motors(
     return SimulatedDrives(bus, config, on_cycle, start=start, modes=modes)
 
 
-def main() -> None:
-    """Run simulated motors in a process."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
+def main() -> int:
+    """Run simulated motors in a process; its exit status."""
+    parser = argparse.ArgumentParser(description="Run simulated motors in a process.")
     parser.add_argument("--config", required=True, help="TOML with a section [drives]")
-    parser.add_argument("--modes", type=int, nargs="+", default=[7, 8])
+    modes = range(1, 11)  # of CiA 402
+    parser.add_argument("--modes", type=int, nargs="+", choices=modes, default=[7, 8], metavar="N")
     parser.add_argument("--start", type=float, nargs="+", help="position of each motor [0]")
-    arguments = parser.parse_args()
+    try:
+        _run(parser.parse_args())
+    except TautscopeError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+def _run(arguments: argparse.Namespace) -> None:
     config = load_config(arguments.config).drives
     if config is None:
         raise ConfigError("drives", None, "a section [drives]")
-    start = np.array(arguments.start or [0.0] * len(config.all_motors))
+    count = len(config.all_motors)
+    start = np.array(arguments.start or [0.0] * count)
+    if len(start) != count:
+        raise ConfigError("--start", arguments.start, f"{count} positions, one of each motor")
     with (
         exit_on_signals(),
         raise_errors_of_threads(),
@@ -82,4 +95,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -152,7 +152,8 @@ class CameraStream:
             self._pending.append((due, stamp, image))
 
     def _listen(self) -> socket.socket:
-        self._path.unlink(missing_ok=True)
+        if self._path.is_socket():  # no other file: it would be somebody's
+            self._path.unlink()
         server = socket.socket(socket.AF_UNIX)
         try:
             server.bind(str(self._path))

@@ -45,7 +45,7 @@ class SimulatedDrive(CanopenNode):
         send: Send,
         log: Callable[[float, str], None],
         *,
-        modes: Collection[int],
+        modes: frozenset[int],
         absent: Collection[int] = (),
     ) -> None:
         super().__init__(config[dof].node, send, absent)

@@ -50,7 +50,7 @@ class SimulatedDrives(SimulatedMotors):
                 config,
                 partial(self._send, dof),
                 partial(self._log, dof),
-                modes=modes,
+                modes=frozenset(modes),  # each is one bit
                 absent=absent,
             )
             for dof in config.all_motors

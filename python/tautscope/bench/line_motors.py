@@ -14,12 +14,13 @@ import tty
 from abc import abstractmethod
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from tautscope.bench.motors import SimulatedMotors
 from tautscope.config import DrivesConfig
+from tautscope.dof import Motor
 from tautscope.errors import ConfigError
 
 _IDLE = 0.005
@@ -32,7 +33,7 @@ _TCGETS2 = 0x802C542A
 class LineMotors(SimulatedMotors):
     """Motors on one line, which the `stops` of their configuration stop.
 
-    ``drives.channel`` becomes a link to the pseudo-terminal.
+    ``drives.channel`` becomes a link to the pseudo-terminal, which entering them makes.
 
     Raises:
         ConfigError: The link cannot be made.
@@ -48,7 +49,21 @@ class LineMotors(SimulatedMotors):
         self._buffer = bytearray()
         self._stepped_at = 0.0
         self._link = Path(config.channel)
-        self._line = self._open()
+
+    def __enter__(self) -> Self:
+        lock = None
+        try:
+            # The lock ends with the process; a link of one that was killed stays.
+            lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._line = self._plug_in()
+        except OSError as error:
+            if lock is not None:
+                os.close(lock)
+            allowed = f"a link that can be made ({error}); is another bench running?"
+            raise ConfigError("drives.channel", str(self._link), allowed) from None
+        self._lock = lock
+        return super().__enter__()
 
     def __exit__(self, *failure: object) -> None:
         try:
@@ -60,7 +75,7 @@ class LineMotors(SimulatedMotors):
 
     @abstractmethod
     def _process(self, now: float) -> None:
-        """Take what is complete in `_buffer`, `_queue` the answers, set `_has_goals` if cycled."""
+        """Take what is complete in `_buffer`, `_queue` the answers, `_begin_cycle` if cycled."""
 
     @abstractmethod
     def _advance(self, period: float, now: float) -> list[int]:
@@ -78,26 +93,19 @@ class LineMotors(SimulatedMotors):
         """How long so many bytes take on the line [s]."""
         return 10 * size / self._config.bitrate
 
-    def _open(self) -> int:
+    def _plug_in(self) -> int:
+        """Open a pseudo-terminal, and make the link to it."""
         line, end = os.openpty()
-        lock = None
         try:
             tty.setraw(end)
-            # The lock ends with the process; a link of one that was killed stays.
-            lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if self._link.is_symlink():
                 self._link.unlink()
             self._link.symlink_to(os.ttyname(end))
-        except OSError as error:
+        except OSError:
             os.close(line)
-            if lock is not None:
-                os.close(lock)
-            allowed = f"a link that can be made ({error}); is another bench running?"
-            raise ConfigError("drives.channel", str(self._link), allowed) from None
+            raise
         finally:
             os.close(end)  # so that a client's exclusive lock ends with the client
-        self._lock = lock
         os.set_blocking(line, False)
         return line
 
@@ -129,10 +137,16 @@ class LineMotors(SimulatedMotors):
 
     def _unplug(self) -> None:
         """Take the adapter away: the client's port is gone, the motors go on."""
-        os.close(self._line)
-        self._link.unlink()
-        self._line, end = os.openpty()
+        self._link.unlink(missing_ok=True)
+        lost, (self._line, end) = self._line, os.openpty()
         os.close(end)
+        os.close(lost)
+
+    def _recover(self, dof: Motor) -> None:
+        is_unplugged = any("unplug" in faults for faults in self._faults.values())
+        if not is_unplugged and not self._link.is_symlink():
+            lost, self._line = self._line, self._plug_in()
+            os.close(lost)
 
     def _rate(self) -> int:
         """The bit rate that the client has set [bit/s]."""
@@ -142,6 +156,12 @@ class LineMotors(SimulatedMotors):
     def _transmit(self, data: bytes) -> None:
         with suppress(OSError):  # the client is gone
             os.write(self._line, data)
+
+    def _begin_cycle(self, now: float) -> None:
+        """Call before new set-points: of several that are read together, each moves the motors."""
+        if self._has_goals:
+            self._step(now, has_cycled=True)
+        self._has_goals = True
 
     def _step(self, now: float, *, has_cycled: bool) -> None:
         # Without a client's cycles the clock counts, and a late step does not move the grid.

@@ -54,9 +54,10 @@ class SimulatedMicrocontroller(LineMotors):
         for message in frames.take_messages(self._buffer, frames.LONGEST_REQUEST):
             if is_silent:
                 continue
+            if message[0] == Request.SETPOINTS:
+                self._begin_cycle(now)
             answer = self.board.answer(message, milliseconds)
             self._queue(now + late + self._wire_time(len(message) + len(answer)), answer)
-            self._has_goals |= message[0] == Request.SETPOINTS
         if self.board.state != before:
             for dof in self._config.all_motors:
                 self._log(dof, now, self.board.state.name.lower())
@@ -93,5 +94,6 @@ class SimulatedMicrocontroller(LineMotors):
             self._unplug()
 
     def _recover(self, dof: Motor) -> None:
+        super()._recover(dof)
         self._blocked.discard(dof)
         self.board.faults[self._at[dof]] = 0

@@ -35,7 +35,10 @@ class SimulatedServos(LineMotors):
         self._events.clear()
 
     def _process(self, now: float) -> None:
+        first = next(self._order)
         for packet in self._codec.split(self._buffer):
+            # The client waits for the answer to the last packet, and would take another for it.
+            self._queued = sorted(one for one in self._queued if one[1] < first)
             for servo in self._listening():
                 servo.heard_at = now
             self._serve(packet, now)
@@ -66,6 +69,10 @@ class SimulatedServos(LineMotors):
             servos = sorted(
                 (one for one in servos if one.id in asked), key=lambda one: asked.index(one.id)
             )
+        if packet.instruction == packets.SYNC_WRITE and servos and packet.is_intact:
+            address = _number(packet.data[: self._word])
+            if address == servos[0].family.goal.address:
+                self._begin_cycle(now)
         at = now + self._wire_time(packet.size)
         for servo in servos:
             name, (error, data) = servo.id, (CHECKSUM, b"")  # a new id holds from the next packet
@@ -111,7 +118,6 @@ class SimulatedServos(LineMotors):
         for start in range(0, len(data), size + 1):
             if data[start] == servo.id:
                 servo.write(address, data[start + 1 : start + 1 + size], now)
-        self._has_goals |= address == servo.family.goal.address
 
     def _apply(self, kind: str, dof: Motor, now: float) -> None:
         servo = self.servos[dof]
@@ -124,6 +130,7 @@ class SimulatedServos(LineMotors):
             self._unplug()
 
     def _recover(self, dof: Motor) -> None:
+        super()._recover(dof)
         self.servos[dof].is_blocked = False
 
 

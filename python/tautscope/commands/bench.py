@@ -63,9 +63,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "--modes",
         type=int,
         nargs="+",
+        choices=range(1, 11),
         default=[7, 8],
         metavar="N",
-        help="modes of operation that CiA 402 drives support [7 8]",
+        help="modes of operation that CiA 402 drives support, of 1 to 10 [7 8]",
     )
 
 

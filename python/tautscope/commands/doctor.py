@@ -35,7 +35,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
         _doctor,
         help="check a rig, and say what is missing and what to do",
         description="Check the computer, its cameras and CAN interfaces; with a configuration, "
-        "open its camera, configure its drives and read the settings back. No motor is enabled. "
+        "open its camera, configure its drives and read the settings back. No motor of a "
+        "configuration is enabled; a rig of --rig is reset, and MAY MOVE. "
         "Exit status 0 if nothing is missing, else 1.",
     )
     add_rig(

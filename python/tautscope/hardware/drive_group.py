@@ -118,6 +118,10 @@ class DriveGroup(ABC):
     def status(self, dof: Motor) -> DriveStatus:
         """Read identity, state and position; nothing is written."""
 
+    def may_move_if_set(self, dof: Motor) -> bool:
+        """Whether `commission` changes settings of a motor that has torque."""
+        return False
+
     @abstractmethod
     def commission(self, dof: Motor) -> CommissionedDrive:
         """Set protections, limits and mode, and read them back; the drive stays disabled.

@@ -55,10 +55,15 @@ class DriveMonitor:
             pause = time.monotonic() - self._last_cycle
             self.statistics.longest_pause = max(self.statistics.longest_pause, pause)
 
+    def reset_statistics(self) -> None:
+        """Begin to count anew: the time since the last run is no pause."""
+        count = len(self._scales)
+        self.statistics = BusStatistics([0] * count, [0] * count)
+
     def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
         """Start from motors that are enabled and at rest; their positions (n,) [m or rad]."""
         self._answers = [one.answers for one in feedback]
-        self.statistics = BusStatistics([0] * len(feedback), [0] * len(feedback))
+        self.reset_statistics()
         start = self.positions(feedback)
         self._before = [(at, 0) for at in start]
         """Position [m or rad] and age of each motor in the last cycle."""

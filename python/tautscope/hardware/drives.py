@@ -2,8 +2,8 @@
 
     with open_drives(config.drives) as drives:
         position = drives.start()
-        while running:
-            applied = drives.exchange(command)  # once per drives.cycle, from one thread
+        for applied in drives.follow(commands):  # one command per drives.cycle
+            ...
 
 Their reaction to a lost connection, position and velocity limits are set and read back. `Drives`
 knows no protocol: CiA 402 drives, servos and microcontrollers are behind `DriveGroup`. Every
@@ -153,6 +153,7 @@ class Drives:
             raise StateError(
                 "drives", "start() was called while running or closed", "Open them again"
             )
+        self._monitor.reset_statistics()
         try:
             positions = self._group.read_positions()
             self._monitor.check_start_positions(positions)
@@ -168,7 +169,8 @@ class Drives:
     def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
         """Send one set-point to each drive and read the position actual values.
 
-        Call it every `cycle` seconds: it waits for the answers only.
+        Call it every `cycle` seconds, as `follow` does: it waits for the answers only, and called
+        more often it moves the motors as much faster.
 
         Args:
             command: (n,) [m or rad].
@@ -193,7 +195,7 @@ class Drives:
                 "drives", "a command before start() or after stop()", "Call start() first"
             )
         try:
-            setpoint = _as_vector(command, len(self._scales))
+            setpoint = as_vector(command, len(self._scales))
             targets = [
                 scale.checked_counts(setpoint[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
@@ -286,7 +288,12 @@ class Drives:
         return self._group.quick_stop(again=again)
 
 
-def _as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:
+def as_vector(command: ArrayLike, count: int) -> NDArray[np.float64]:
+    """A command as an array (n,) [m or rad] of its own.
+
+    Raises:
+        SignalError: It is not `count` numbers.
+    """
     try:
         vector = np.array(command, dtype=np.float64)
     except (TypeError, ValueError):

@@ -10,6 +10,7 @@ from tautscope.config import Config, DrivesConfig
 from tautscope.dof import Dof, Motor, NamedDof, unit
 from tautscope.errors import STOPPED, FieldError, SignalError, TautscopeError
 from tautscope.hardware.drives import open_drives
+from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.loop.measurement import Measurement, Pose, Tip, raw_values
 from tautscope.loop.rig import Rig, check_sample
@@ -46,12 +47,17 @@ def jog(
         Largest displacement and displacement at the end, as the drive measured them [m or rad].
 
     Raises:
-        FieldError: The distance is not allowed, see `check_distance`.
+        FieldError: The distance is not allowed, see `check_distance`, or leaves the travel.
         DriveError: A drive is missing, differs from its configuration, or failed.
     """
     check_distance(dof, distance)
     with exit_on_signals(), open_drives(config) as drives:
         begin = drives.start(reset_faults=reset_faults)
+        if not Scale(config[dof], dof).is_inside(begin[dof] + distance):
+            at = f"{dof.label} is at {begin[dof]:.4g} {unit(dof)}"
+            lower, upper = config[dof].travel
+            allowed = f"within {dof.key}.travel, {lower:g} to {upper:g} {unit(dof)}: {at}"
+            raise FieldError("distance", distance, allowed)
         commands = [command for _, command in _out_and_back(begin, dof, distance, config.cycle)]
         try:
             applied = [begin, *drives.follow(commands)]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config, DrivesConfig, check_config
 from tautscope.errors import ConfigError, SignalError
-from tautscope.hardware.drives import Drives, open_drives
+from tautscope.hardware.drives import Drives, as_vector, open_drives
 from tautscope.hardware.realtime import LOOP, realtime, short_switch_interval
 from tautscope.hardware.setpoint_thread import SetpointThread
 from tautscope.hardware.timing import Timing
@@ -76,9 +76,9 @@ class MotorRig:
     def start(self) -> NDArray[np.float64] | None:
         """Where `reset` moves the motors (m,): by default where each DOF is amid its ``range``.
 
-        None if a DOF has no range: they stay where they are.
+        None without [[dof]], or if a DOF has no range: they stay where they are.
         """
-        if any(dof.range is None for dof in self._config.dof):
+        if not self._config.dof or any(dof.range is None for dof in self._config.dof):
             return None
         middle = np.array([np.mean(dof.range) for dof in self._config.dof if dof.range])
         if self._config.actuators is None:
@@ -129,7 +129,7 @@ class MotorRig:
         if self._setpoints is None:
             raise SignalError("rig", "closed", "a rig after reset() and before close()")
         try:
-            target = np.array(command, dtype=np.float64)
+            target = as_vector(command, len(self._drives.all_motors))
             sent, applied = self._setpoints.send(target)
             self._sent.append((sent, self._ticks * self.control_period))
             self._ticks += 1

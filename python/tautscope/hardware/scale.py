@@ -56,7 +56,7 @@ class Scale:
         Raises:
             SignalError: The command is not finite, outside the travel, or exceeds the speed limit.
         """
-        axis = self.axis
+        axis, command = self.axis, float(command)  # as a number in messages
         field = f"command[{self.dof.label}]"
         if not math.isfinite(command):
             raise SignalError(field, command, "a finite number")

@@ -6,6 +6,7 @@ from pathlib import Path
 from tautscope.config import CameraConfig, Config
 from tautscope.errors import ConfigError
 from tautscope.hardware.drives import open_group
+from tautscope.hardware.rig_lock import RigLock
 
 CAMERA = "camera"
 
@@ -29,11 +30,11 @@ def read_serial_numbers(config: Config) -> dict[str, str]:
 
     Raises:
         ConfigError: The section ``drives`` is missing.
-        DriveError: A drive does not answer.
+        DriveError: A drive does not answer, or another program commands them.
     """
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
-    with closing(open_group(config.drives)) as group:
+    with RigLock(config.drives), closing(open_group(config.drives)) as group:
         drives = {
             motor.label: number
             for motor in config.drives.all_motors

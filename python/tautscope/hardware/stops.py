@@ -11,6 +11,7 @@ from tautscope.dof import Motor
 from tautscope.errors import CalibrationError, FollowingError, may_move
 from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
+from tautscope.hardware.servos.families import FAMILIES
 from tautscope.hardware.signals import exit_on_signals
 
 _SPEED_SHARE = 0.05
@@ -67,41 +68,42 @@ def find_stops(config: Config, dof: Motor, torque: float) -> Stops:
         DriveError: A drive is missing, differs from its configuration, or failed.
     """
     search = _search_config(config, dof, torque)
+    assert config.drives is not None
+    reach = _REACH * np.ptp(config.drives[dof].travel)
     with exit_on_signals():
         with open_drives(search) as drives:
             begin = float(drives.start()[dof])
-        ends = [_seek_stop(search, dof, direction, begin) for direction in (-1, 1)]
+        ends = [_seek_stop(search, dof, direction, begin, reach) for direction in (-1, 1)]
     return Stops(*ends)
 
 
 def _search_config(config: Config, dof: Motor, torque: float) -> DrivesConfig:
-    """The drives with little torque and a travel that hardly ends."""
+    """The drives with little torque and a travel that ends where the motor counts no further."""
     assert config.drives is not None
     axis, path = config.drives[dof], dof.key
+    limited = config.replace(**{f"{path}.stops": None, f"{path}.torque_limit": torque})
     reach = (1 + _REACH) * (axis.travel[1] - axis.travel[0])
     # A restarted servo reports a position within its first turn, wherever that is in the DOF.
-    turn = sorted(Scale(axis, dof).to_position(count) for count in (0, COUNTS_PER_TURN))
-    changes = {
-        f"{path}.stops": None,
-        f"{path}.torque_limit": torque,
-        f"{path}.travel": [
-            min(axis.travel[0], turn[0]) - reach,
-            max(axis.travel[1], turn[1]) + reach,
-        ],
-    }
-    drives = config.replace(**changes).drives
+    largest = FAMILIES[config.drives.protocol].largest
+    counts = (0, COUNTS_PER_TURN), (-largest, largest)
+    turn, most = (sorted(map(Scale(axis, dof).to_position, pair)) for pair in counts)
+    lower = max(min(axis.travel[0], turn[0]) - reach, most[0])
+    upper = min(max(axis.travel[1], turn[1]) + reach, most[1])
+    drives = limited.replace(**{f"{path}.travel": [lower, upper]}).drives
     assert drives is not None
     return drives
 
 
-def _seek_stop(config: DrivesConfig, dof: Motor, direction: int, begin: float) -> float:
+def _seek_stop(
+    config: DrivesConfig, dof: Motor, direction: int, begin: float, reach: float
+) -> float:
     """Drive against the stop in a direction, and back to the begin; the position of the stop."""
     step = direction * _SPEED_SHARE * config[dof].speed_limit * config.cycle
-    reach = _REACH / (3 + 2 * _REACH) * (config[dof].travel[1] - config[dof].travel[0])
     at = begin
     try:
         with open_drives(config) as drives:
             command = drives.start()
+            reach = min(reach, abs(config[dof].travel[direction > 0] - command[dof]))
             for _ in range(int(reach / abs(step))):
                 command[dof] += step
                 at = float(_paced(drives, command)[dof])

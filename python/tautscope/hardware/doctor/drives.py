@@ -3,6 +3,7 @@
 import logging
 import statistics
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 from tautscope.config import Config, DrivesConfig
@@ -10,9 +11,10 @@ from tautscope.config.microcontroller import SERIAL_PORTS
 from tautscope.dof import Motor
 from tautscope.errors import ConfigError, DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found, result
-from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
+from tautscope.hardware.drive_group import DriveGroup
 from tautscope.hardware.drives import open_group
 from tautscope.hardware.plausibility import check_experiment
+from tautscope.hardware.rig_lock import RigLock
 from tautscope.hardware.scale import Scale
 
 VIRTUAL_INTERFACES = ("virtual", "udp_multicast", "tautscope")
@@ -58,35 +60,32 @@ def check_interfaces(*, needed: bool) -> CheckResult:
 def check_drives(config: DrivesConfig) -> list[CheckResult]:
     """Check bus, drives, settings, heartbeats and answers.
 
-    Nothing is written to a drive that is enabled or in fault. A motor in quick stop stays held.
+    Nothing is written to a drive that is enabled or in fault, or to a servo whose torque is on. A
+    motor in quick stop stays held.
     """
     name = config.interface if config.protocol == "canopen" else config.protocol
     bus = f"bus {name} {config.channel}"
-    try:
-        group = open_group(config)
-    except TautscopeError as error:
-        return [from_error("drives", bus, error)]
-    try:
+    with ExitStack() as resources:
+        try:
+            resources.enter_context(RigLock(config))
+            group = open_group(config)
+        except TautscopeError as error:
+            return [from_error("drives", bus, error)]
+        resources.callback(group.close)
         findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
-        findings += _check_latency(config)
-        findings += [_check_drive(group, config, dof) for dof in config.all_motors]
-        if any(finding.status == "missing" for finding in findings):
-            return findings
-        settings = []
-        for dof in config.all_motors:
-            try:
-                settings.append(_settings(group.commission(dof), config))
-            except DriveError as error:
-                settings.append(from_error("drives", f"{group.names[dof]}: settings", error))
-        findings += settings
-        if all(finding.status != "missing" for finding in settings):
-            group.configure()
-            findings.append(_check_answers(group, config))
-    except DriveError as error:
-        findings.append(from_error("drives", "heartbeats and answers", error))
-    finally:
-        group.close()
-    return findings
+        try:
+            findings += _check_latency(config)
+            findings += [_check_drive(group, config, dof) for dof in config.all_motors]
+            if any(finding.status == "missing" for finding in findings):
+                return findings
+            settings = [_check_settings(group, config, dof) for dof in config.all_motors]
+            findings += settings
+            if all(finding.status != "missing" for finding in settings):
+                group.configure()
+                findings.append(_check_answers(group, config))
+        except DriveError as error:
+            findings.append(from_error("drives", "heartbeats and answers", error))
+        return findings
 
 
 def check_commands(config: Config) -> CheckResult:
@@ -139,7 +138,15 @@ def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckRe
     return result("drives", what, found, data, missing=todo)
 
 
-def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
+def _check_settings(group: DriveGroup, config: DrivesConfig, dof: Motor) -> CheckResult:
+    what = f"{group.names[dof]}: settings"
+    try:
+        if group.may_move_if_set(dof):
+            found = "not checked: its torque is on, so that nothing is written to it"
+            return CheckResult("drives", what, "note", found)
+        drive = group.commission(dof)
+    except DriveError as error:
+        return from_error("drives", what, error)
     mode = f"mode {drive.mode}; " if drive.mode else ""
     found = f"{mode}{len(drive.settings)} settings read back correctly"
     data = {"mode": drive.mode, "settings": drive.settings, "absent": list(drive.absent)}
@@ -149,7 +156,7 @@ def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
     if drive.absent:
         todo = "Make sure that other protections replace these objects"
         found += f"; it does not have or take {', '.join(drive.absent)}"
-    return result("drives", f"{drive.name}: settings", found, data, note=todo)
+    return result("drives", what, found, data, note=todo)
 
 
 def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:

@@ -43,7 +43,7 @@ class SerialDrives(DriveGroup):
     """Motors behind a microcontroller on an open port, which is closed with them.
 
     Raises:
-        BusError: No microcontroller answers.
+        SilentDriveError: No microcontroller answers.
         ModeRefusedError: It speaks another version of the protocol.
     """
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ _IDS = range(1, 21)
 """Ids that a search asks."""
 _LOST = re.compile("input/output|broken pipe|no such device|bad file|not configured", re.I)
 """Errors of the operating system when a serial adapter is gone."""
+_FAILURES = (OSError, RuntimeError, ValueError)
+"""Errors of `rustypot`."""
 _REFUSALS = {
     1: "it could not process the packet",
     2: "unknown instruction",
@@ -46,7 +49,7 @@ class ServoLine:
         make = getattr(rustypot, family.controller)
         try:
             self._port: Any = make(config.channel, config.bitrate, config.request_timeout)
-        except (OSError, RuntimeError, ValueError) as error:
+        except _FAILURES as error:
             raise BusError(
                 f"servos on {config.channel}",
                 f"the port cannot be opened: {error}",
@@ -101,15 +104,23 @@ class ServoLine:
         """Restart a servo, which forgets its turns and its settings that are not stored."""
         self._transfer(self._port.reboot, servo)
 
-    def search(self) -> str:
-        """The servos that answer, in words: ids 1 to 20, at the first bit rate with an answer."""
+    @cached_property
+    def found(self) -> str:
+        """The servos that answer, in words: ids 1 to 20, at the first bit rate with an answer.
+
+        They are searched once, which takes seconds.
+        """
         rates = dict.fromkeys((self._config.bitrate, *self._family.rates))
-        for rate in rates:
-            with suppress(OSError, RuntimeError, ValueError):
-                self._port.set_baudrate(rate)
-                found = sorted(self._port.scan(_IDS))
-                if found:
-                    return f"ids {', '.join(map(str, found))} answer at {rate} bit/s"
+        try:
+            for rate in rates:
+                with suppress(*_FAILURES):
+                    self._port.set_baudrate(rate)
+                    found = sorted(self._port.scan(_IDS))
+                    if found:
+                        return f"ids {', '.join(map(str, found))} answer at {rate} bit/s"
+        finally:
+            with suppress(*_FAILURES):
+                self._port.set_baudrate(self._config.bitrate)
         tried = ", ".join(map(str, rates))
         return f"none of ids {_IDS[0]} to {_IDS[-1]} answers at {tried} bit/s"
 
@@ -120,7 +131,7 @@ class ServoLine:
     def _transfer(self, transfer: Callable[..., Any], *arguments: Any) -> Any:
         try:
             return transfer(*arguments)
-        except (RuntimeError, OSError, ValueError) as error:
+        except _FAILURES as error:
             if Path(self._config.channel).exists() and not _LOST.search(str(error)):
                 raise NoAnswerError(str(error)) from None  # late, lost or damaged
             raise BusError(

@@ -75,6 +75,8 @@ class Servo:
     def commission(self) -> CommissionedDrive:
         """Set the mode for several turns, speed and torque limit, and read them back.
 
+        A servo with torque whose host failed is held where it is.
+
         Raises:
             ModeRefusedError: It is another model.
             StateError: A stored setting differs while the torque is on.
@@ -91,6 +93,7 @@ class Servo:
                 f"{self._dof.key}.travel is up to {furthest} counts from 0",
                 f"It counts to {self._family.largest}: correct travel, home or counts_per_unit",
             )
+        self._end_watchdog()
         settings = self._family.settings(self._axis, scale.speed_counts())
         for setting in settings:
             self._set(setting)
@@ -134,6 +137,20 @@ class Servo:
             )
         return position
 
+    def _end_watchdog(self) -> None:
+        """End the watchdog that a failed host left, without a motion to its goal.
+
+        The goal cannot be written before the stop by the watchdog is ended, from when on a servo
+        with torque goes there: the torque is off meanwhile.
+        """
+        family = self._family
+        if family.watchdog is None or not (self.read(family.torque) and self.read(family.watchdog)):
+            return
+        self.write(family.torque, 0)
+        self.write(family.watchdog, 0)
+        self.write(family.goal, self.read(family.position))
+        self.write(family.torque, 1)
+
     def _set(self, setting: Setting) -> None:
         """Write a setting if it differs, and read it back; EEPROM wears out."""
         register, family = setting.register, self._family
@@ -171,7 +188,7 @@ class Servo:
             remedy = "Check its supply and cable"
             if self.may_search:
                 remedy += f", {self._dof.key}.node and drives.bitrate: "
-                remedy += self._line.search()
+                remedy += self._line.found
             raise SilentDriveError(self.name, "no answer", remedy) from None
 
 

@@ -42,6 +42,10 @@ class ServoDrives(DriveGroup):
         """See `Servo.status`."""
         return self._servos[dof].status()
 
+    def may_move_if_set(self, dof: Motor) -> bool:
+        """Whether its torque is on."""
+        return bool(self._servos[dof].read(self._family.torque))
+
     def commission(self, dof: Motor) -> CommissionedDrive:
         """See `Servo.commission`."""
         return self._servos[dof].commission()
