@@ -8,13 +8,25 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import own_catheter
 import pytest
 import tautscope
+from console.pages import PERIOD
 from numpy.typing import ArrayLike
-from running import Arm, Page, RunningConsole, play_all, player_of, rests, running_console
+from running import (
+    Arm,
+    Page,
+    RunningConsole,
+    play_all,
+    player_of,
+    receive_image,
+    rests,
+    running_console,
+    small_config,
+)
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
 from tautscope.console.actions import Actions
@@ -33,13 +45,14 @@ from tautscope.console.session import Session
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.state import LogState
-from tautscope.errors import StateError
+from tautscope.errors import STOPPED, StateError
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
 from tautscope.loop.rig import Rig, Sample, reset_unless
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
+from tautscope.twin.rig import Twin
 
 SLACK = 0.3
 """Of the catheter to each side [rad]."""
@@ -135,6 +148,43 @@ def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
         tick = by_time[state["time"]]
         assert np.allclose(state["command"], tick.command)
         assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
+
+
+def test_a_page_that_is_opened_after_a_stop_shows_the_last_image_and_may_enable(
+    tmp_path: Path,
+) -> None:
+    latencies: list[Any] = []
+    with console_of(tmp_path, small_config(), Twin, is_twin=False) as console:
+
+        def enabled() -> str:
+            """The reply to a new page, which names the image that it shows, if it shows one."""
+            page, video = console.page(), console.page("/video")
+            image, newest = 0, console.control.images.newest
+            while image < newest:
+                image = receive_image(video)[0]["sequence"]
+            page.on_latency = latencies.append
+            video.send({"type": "drawn", "image": image, "width": 180})
+            rest = {"type": "servo", "axes": (0, 0, 0), "is_holding": False}
+
+            def is_answered() -> bool:
+                page.send({**rest, **page.fields(image)})  # or the page would be away
+                return page.replies[-1]["what"] == "enable"
+
+            page.take()
+            page.wait(lambda: page.replies)
+            assert not is_answered()
+            page.send({"type": "action", "name": "enable", **page.fields(image)})
+            page.wait(is_answered, PERIOD)
+            reply = page.replies[-1]
+            page.wait(lambda: not reply["is_accepted"] or console.control.images.newest > newest)
+            page.send({"type": "stop"})
+            page.wait(lambda: console.control.run is None)
+            page.close()
+            video.close()
+            return str(reply["reason"])
+
+        assert [enabled(), enabled()] == ["", ""]
+    assert not latencies  # that of an old image is none
 
 
 class Slow(Arm):
@@ -271,7 +321,7 @@ class Unconfirmed(Arm):
 
 @pytest.mark.parametrize("where", ["close", "step"])
 def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
-    tmp_path: Path, where: str
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, where: str
 ) -> None:
     arm = Unconfirmed(2)
     note = "bend_x: quick stop is not confirmed. Use the emergency stop: the motor may be moving"
@@ -297,11 +347,35 @@ def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
         assert message.startswith("THE MOTORS MAY STILL MOVE: ")
         assert note in message
         assert drives == "THE MOTORS MAY STILL MOVE"
+        with pytest.raises(StateError, match="emergency stop") as raised:
+            control.shut_down()
+        assert note in str(raised.value)
+        assert raised.value.exit_status == STOPPED
+        assert note in caplog.text
         arm.close_error = arm.step_error = None
         control.operator.enable()
         control.open()
         assert shown()[::2] == ("ready", "enabled")
         session._publisher.close()
+
+
+def test_an_end_while_motors_are_enabled_tells_that_they_may_move(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = Unconfirmed(2)
+
+    def reset() -> Sample:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(arm, "reset", reset)
+    arm.close_error = StateError("bend_x", "quick stop is not confirmed", "See to the rig")
+    with control_of(tmp_path, arm) as control:
+        with pytest.raises(KeyboardInterrupt):
+            control.open()
+        with pytest.raises(StateError, match=r"may still move .bend_x: quick") as raised:
+            control.shut_down()
+        assert raised.value.exit_status == STOPPED
+        control.unconfirmed = ""
 
 
 @pytest.mark.parametrize("is_simulated", [True, False])

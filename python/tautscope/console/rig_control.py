@@ -15,7 +15,7 @@ from tautscope.console.control_run import ControlRun
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
-from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
+from tautscope.errors import EMERGENCY_STOP, STOPPED, StateError, TautscopeError, described
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Rig, Sample, check_sample, disable, reset_unless
@@ -147,24 +147,37 @@ class RigControl:
             self.run.log.image_format = "png" if is_recording else "jpeg"
 
     def shut_down(self) -> None:
-        """Stop the motors, release the rig, and wait for the logs."""
+        """Stop the motors, release the rig, and wait for the logs.
+
+        Raises:
+            StateError: The motors may still move: their drives did not confirm the last stop.
+        """
         self.close()
+        self._stop_motors("")  # of a rig that was being enabled
         self._rig.close()
         for thread in self._endings:
             thread.join()
+        if self.unconfirmed:
+            what = f"the motors may still move ({self.unconfirmed})"
+            error = StateError("rig", what, EMERGENCY_STOP)
+            error.exit_status = STOPPED
+            raise error
 
     def _stop_motors(self, fault: str, *, is_disabling: bool = False) -> None:
-        self.fault = fault
+        self.fault, unconfirmed = fault, ""
         try:
             if self.is_hardware and is_disabling:
                 disable(self._rig)
             elif self.is_hardware:
                 self._rig.close()
         except TautscopeError as error:
-            self.unconfirmed = described(error)
-            self.fault = f"{fault}; {self.unconfirmed}" if fault else self.unconfirmed
+            unconfirmed = described(error)
+            self.fault = f"{fault}; {unconfirmed}" if fault else unconfirmed
         if EMERGENCY_STOP in fault:
-            self.unconfirmed = fault
+            unconfirmed = fault
+        if unconfirmed:
+            _LOG.warning("%s", unconfirmed)
+            self.unconfirmed = unconfirmed
         self.ended_at = time.monotonic()
 
     def _start_run(self, sample: Sample) -> None:
