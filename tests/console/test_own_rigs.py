@@ -44,10 +44,11 @@ from tautscope.console.rig_control import INTERRUPTED, RigControl
 from tautscope.console.session import Session
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
-from tautscope.console.state import LogState
+from tautscope.console.state import LogState, State
 from tautscope.errors import STOPPED, StateError
-from tautscope.log.reader import Log, Tick, read_log
+from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.replay import replay_same
+from tautscope.loop import vision
 from tautscope.loop.kinematics import TwoPlanes
 from tautscope.loop.rig import Rig, Sample, reset_unless
 from tautscope.runs.rigs import rig_maker
@@ -412,6 +413,72 @@ def test_neither_a_hold_nor_a_warning_ends_with_its_run(tmp_path: Path, is_simul
         assert execute(4, name="acknowledge").is_accepted
         assert shown()[1] == []
         session._publisher.close()
+
+
+@pytest.mark.parametrize("by", ["STOP", "profile"])
+def test_a_take_ends_with_its_log(tmp_path: Path, by: str) -> None:
+    paths = [tmp_path / f"console-{number}.mcap" for number in (1, 2)]
+    with control_of(tmp_path, Arm(2)) as control:
+        actions = Actions(control, lambda: None)
+        control.lease.take(1)
+        control.open()
+
+        def record(number: int) -> str:
+            message = Action(control.lease.number, number, 0, "record")
+            return actions.execute(Received(1, time.monotonic(), message)).reason
+
+        assert record(1) == f"take 1, lossless, into {paths[0]}"
+        if by == "STOP":
+            control.stop("STOP by page 1")
+            control.operator.enable()
+            control.open()
+        else:
+            control.restart(control.config.replace(profile="paper"))
+        assert not control.is_recording
+        assert control.run.log.image_format == "jpeg"
+        assert record(2) == f"take 2, lossless, into {paths[1]}"
+        assert record(3).startswith(f"take 2 is in {paths[1]}, from 0 to 0 s")
+    for number, end in ((1, "the take ends with its log"), (2, "take 2 ends")):
+        events = read_log(paths[number - 1]).events.values()
+        notes = [event.text for event in events if isinstance(event, Request)]
+        takes = [note for note in notes if "take" in note]
+        assert takes == [f"note take {number} begins", f"note {end}"]
+
+
+def test_nothing_is_known_of_a_rig_that_is_off_but_its_last_log(tmp_path: Path) -> None:
+    with control_of(tmp_path, Arm(2)) as control:
+        session = session_of(control)
+
+        def shown() -> State:
+            return session_state(control, session._publisher.log, time.monotonic())
+
+        assert shown().tip == (None, None)
+        assert shown().log == LogState()
+        control.open()
+        session._tick(control.run)
+        assert shown().tip == (0.0, 0.0)
+        path = str(control.run.path)
+        deadline = time.monotonic() + 20
+        while shown().log.path != path:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        control.run.log._journal.failure = "the disk is full"
+        control.stop("STOP by page 1")
+        assert control.run is None
+        assert shown().tip == (None, None)
+        assert (shown().log.path, shown().log.failure) == (path, "the disk is full")
+        session._publisher.close()
+
+
+@pytest.mark.parametrize("config", [Config(), tautscope.axes(1, width_limit=1.0)])
+def test_what_is_slow_at_first_is_done_before_motors_are_enabled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: Config
+) -> None:
+    monkeypatch.setattr(vision, "_tables", {})
+    rig = PacedRig(lambda: Arm(1), 0.005, is_simulated=False)
+    with ThreadPoolExecutor(1) as executor:
+        RigControl(config, rig, tmp_path, executor)
+    assert bool(vision._tables) == (not config.dof)
 
 
 def broken(*_: object) -> Sample:
