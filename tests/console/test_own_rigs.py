@@ -467,6 +467,8 @@ def test_nothing_is_known_of_a_rig_that_is_off_but_its_last_log(tmp_path: Path) 
         assert control.run is None
         assert shown().tip == (None, None)
         assert (shown().log.path, shown().log.failure) == (path, "the disk is full")
+        ended = session_state(control, LogState(path, 5, remaining=9.0), time.monotonic()).log
+        assert ended.remaining is None
         session._publisher.close()
 
 

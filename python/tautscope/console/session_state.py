@@ -36,6 +36,8 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
             state.show_truth(run.sample.true_state, control.kinematics)
     if (written := control.log) is not None:
         state.log = replace(log, dropped=written.dropped, failure=written.failure)
+    if run is None:
+        state.log.remaining = None  # it is that of a log that grows
     state.image.sequence = control.images.newest
     state.motion, message = _motion(control)
     state.message = message[:LONGEST_REASON]
