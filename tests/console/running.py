@@ -6,6 +6,7 @@ Its limits of time are longer than in use, because the computer may be busy.
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import threading
 import time
@@ -15,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from console import pages
@@ -131,7 +133,7 @@ def running_console(
         thread.start()
         try:
             # Motors wait for the operator.
-            while control.images.newest < 3 or not (control.run or control.is_hardware):
+            while not control.is_hardware and (control.images.newest < 3 or not control.run):
                 assert thread.is_alive()
                 time.sleep(0.01)
             yield RunningConsole(url, control, server)
@@ -169,3 +171,15 @@ def rests(console: RunningConsole, duration: float = 0.3) -> bool:
     before = console.command
     time.sleep(duration)
     return bool((console.command == before).all())
+
+
+def receive_image(video: Page) -> tuple[dict[str, Any], np.ndarray]:
+    """The next image of a connection, with what is drawn over it."""
+    message = video.socket.recv(timeout=20)
+    assert isinstance(message, bytes)
+    length = int.from_bytes(message[:4], "little")
+    overlay = json.loads(message[4 : 4 + length])
+    pixels = np.frombuffer(message[4 + length :], np.uint8)
+    image = cv2.imdecode(pixels, cv2.IMREAD_COLOR)
+    assert image is not None
+    return overlay, image

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,11 +20,17 @@ from console.steering import DEVICES, GAMEPAD, holding, use_all_controls
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from running import AGE, Arm, RunningConsole, rests, running_console
 from tautscope.config import load_config
+from tautscope.console.control_run import ControlRun
+from tautscope.console.log_player import LogPlayer
 from tautscope.console.messages import Setting
 from tautscope.console.paced_rig import PacedRig
+from tautscope.console.start import web_server
 from tautscope.console.uncompensated import Score
 from tautscope.dof import Dof
+from tautscope.log.reader import read_log
+from tautscope.log.writer import LogWriter
 from tautscope.loop.construction import build_feature_model
+from tautscope.loop.rig import Sample
 from tautscope.loop.safety import REMEDIES, by_urgency
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
@@ -673,5 +680,136 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
             arm.picture = arm.picture[1:]
             text = "image: got 'uint8 array (575, 720, 3)'"
             expect(page.locator("#message")).to_contain_text(text, timeout=TIMEOUT)
+        assert problems == []
+    context.close()
+
+
+@contextmanager
+def recording(folder: Path, duration: float) -> Iterator[RunningConsole]:
+    """The address of a recording that is shown: of an axis that moves, without images."""
+    path, config = folder / "run.mcap", tautscope.axes(1, width_limit=1.0, unit="rad")
+    with LogWriter(path, config, wait=True) as log:
+        for now in np.arange(0, duration, 0.02):
+            moved = np.array([np.sin(now) * now])
+            log.tick(Sample(now, moved), moved, moved)
+    ended = threading.Event()
+    with web_server(config, 0) as (server, channels, url):
+        player = LogPlayer(read_log(path), channels)
+
+        def show() -> None:
+            while not ended.wait(0.05):
+                player.run(lambda: not ended.is_set())
+                player.publish()
+
+        thread = threading.Thread(target=show)
+        thread.start()
+        try:
+            yield RunningConsole(url, None, server)  # type: ignore[arg-type]
+        finally:
+            ended.set()
+            thread.join()
+            player.close()
+
+
+SHOWN = "[parseFloat(seek.value), parseFloat(at.textContent)]"
+
+
+def test_the_timeline_follows_after_a_click_and_keys_move_it(
+    browser: Browser, tmp_path: Path
+) -> None:
+    context = browser.new_context()
+    context.set_default_timeout(TIMEOUT)
+    with recording(tmp_path, 60.0) as shown:
+        page = context.new_page()
+        page.goto(shown.url)
+        box = page.locator("#seek").bounding_box()
+        assert box is not None
+        page.locator("#seek").click(position={"x": 0.2 * box["width"], "y": box["height"] / 2})
+
+        def follows(after: float, before: float) -> bool:
+            value, at = page.evaluate(SHOWN)
+            return bool(after < value < before and abs(value - at) < 0.15)
+
+        wait(lambda: follows(14, 30))
+        page.click("#play")
+        expect(page.locator("#play")).to_have_text("Play", timeout=TIMEOUT)
+        page.focus("#seek")
+        _, before = page.evaluate(SHOWN)
+        for _ in range(10):
+            page.keyboard.press("ArrowRight")
+        wait(lambda: follows(before, before + 1.2))
+        page.keyboard.press("Home")
+        wait(lambda: page.evaluate(SHOWN) == [0, 0])
+    context.close()
+
+
+def test_charts_show_no_other_time_than_that_of_a_paused_recording(
+    browser: Browser, tmp_path: Path
+) -> None:
+    drawn = "document.querySelector('.chart canvas').toDataURL()"
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(TIMEOUT)
+    with recording(tmp_path, 60.0) as shown:
+        page = context.new_page()
+        page.goto(shown.url)
+        wait(lambda: page.evaluate(SHOWN)[1] > 1)
+        page.click("#play")
+        expect(page.locator("#play")).to_have_text("Play", timeout=TIMEOUT)
+        page.wait_for_timeout(500)
+        before = page.evaluate(drawn)
+        page.wait_for_timeout(300)
+        assert page.evaluate(drawn) == before
+        page.evaluate("seek.value = 20; seek.dispatchEvent(new Event('input'))")
+        wait(lambda: page.evaluate(SHOWN)[1] == 20)
+        wait(lambda: page.evaluate(drawn) != before)
+    context.close()
+
+
+def test_an_address_without_a_valid_token_says_so(console: RunningConsole, browser) -> None:
+    for address in ("/", "/#token=of-another-console"):
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(console.origin + address)
+        expect(page.locator("#message")).to_contain_text("no valid token", timeout=TIMEOUT)
+        context.close()
+    assert rests(console, 0.1)
+
+
+def test_a_rig_that_is_off_has_no_numbers_and_keeps_its_charts_and_log(
+    browser: Browser, tmp_path: Path
+) -> None:
+    config = tautscope.axes(1, width_limit=1.0, unit="rad")
+    rig = PacedRig(lambda: Arm(1), config.control.period, is_simulated=False)
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(TIMEOUT)
+    drawn = "document.querySelector('.chart canvas').toDataURL()"
+    with running_console(tmp_path, config, rig) as console, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ControlRun, "tip", property(lambda run: run.reference + 1e-4))
+        page = context.new_page()
+        problems: list[str] = []
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.goto(console.url)
+        error, facts = page.locator(".error"), page.locator("#facts")
+        expect(error).to_have_text("–", timeout=TIMEOUT)
+        expect(facts).not_to_contain_text("MB")
+        page.click("#take")
+        page.click("#enable")
+        expect(page.locator("#motion")).to_have_text("READY", timeout=TIMEOUT)
+        expect(error).to_have_text("0.0 °", timeout=TIMEOUT)  # it is -0.006
+        expect(facts).to_contain_text("console-1.mcap", timeout=TIMEOUT)
+        page.keyboard.down("ArrowUp")
+        wait(lambda: moves(console))
+        page.keyboard.up("ArrowUp")
+        page.locator("#stop").dispatch_event("pointerdown")
+        expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+        expect(error).to_have_text("–", timeout=TIMEOUT)
+        expect(page.locator("p.score")).to_have_text("–")
+        expect(page.locator(".offsets")).to_have_text("tip ± –, slack –")
+        expect(facts).to_contain_text("console-1.mcap")
+        page.wait_for_timeout(300)
+        before = page.evaluate(drawn)
+        page.wait_for_timeout(300)
+        assert page.evaluate("charts.querySelector('canvas').width") > 300
+        assert page.evaluate(drawn) == before
         assert problems == []
     context.close()

@@ -5,14 +5,18 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from argparse import Namespace
 from pathlib import Path
 
 import pytest
+import tautscope
+from console.pages import Page, console
 from refused import failed
 from tautscope.commands.rig_choice import choose_rig
 from tautscope.config import load_config
 from tautscope.console.rig_control import RigControl
+from tautscope.errors import STOPPED
 from tautscope.hardware.rig import HardwareRig
 from tautscope.twin.rig import Twin
 
@@ -78,3 +82,31 @@ def test_it_prints_its_address_and_ends_with_ctrl_c(
         assert process.wait(30) == 0
         assert process.stderr.read() == b""
         assert json.loads(process.stdout.read()) == {"log": str(tmp_path / "out/console-1.mcap")}
+
+
+RIG = """
+from tautscope import PlayRig
+from tautscope.errors import StateError
+class Silent(PlayRig):
+    def close(self):
+        raise StateError("x", "quick stop is not confirmed", "Use the emergency stop: it may move")
+"""
+
+
+def test_motors_that_may_still_move_are_its_exit_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("silent.py").write_text(RIG, encoding="utf-8")
+    config = tautscope.axes(2, width_limit=1.0)
+    with console(tmp_path, config, "--rig", "silent:Silent") as (address, process):
+        page = Page(address)
+        page.take()
+        while not (tmp_path / "out" / "console-1.mcap").exists():
+            page.servo((0.0, 0.0), is_holding=False)
+            if page.state["motion"] == "off":
+                page.action("enable")
+            time.sleep(0.1)
+        page.close()
+    assert process.returncode == STOPPED
+    assert "error: rig: the motors may still move (x: quick stop" in capfd.readouterr().err

@@ -8,13 +8,25 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import own_catheter
 import pytest
 import tautscope
+from console.pages import PERIOD
 from numpy.typing import ArrayLike
-from running import Arm, Page, RunningConsole, play_all, player_of, rests, running_console
+from running import (
+    Arm,
+    Page,
+    RunningConsole,
+    play_all,
+    player_of,
+    receive_image,
+    rests,
+    running_console,
+    small_config,
+)
 from tautscope.config import Config, DofEntry, load_config
 from tautscope.console import log_player, paced_rig
 from tautscope.console.actions import Actions
@@ -32,14 +44,16 @@ from tautscope.console.rig_control import INTERRUPTED, RigControl
 from tautscope.console.session import Session
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels, SharedMemory
-from tautscope.console.state import LogState
-from tautscope.errors import StateError
-from tautscope.log.reader import Log, Tick, read_log
+from tautscope.console.state import LogState, State
+from tautscope.errors import STOPPED, StateError
+from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.replay import replay_same
+from tautscope.loop import vision
 from tautscope.loop.kinematics import TwoPlanes
 from tautscope.loop.rig import Rig, Sample, reset_unless
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
+from tautscope.twin.rig import Twin
 
 SLACK = 0.3
 """Of the catheter to each side [rad]."""
@@ -135,6 +149,43 @@ def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
         tick = by_time[state["time"]]
         assert np.allclose(state["command"], tick.command)
         assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
+
+
+def test_a_page_that_is_opened_after_a_stop_shows_the_last_image_and_may_enable(
+    tmp_path: Path,
+) -> None:
+    latencies: list[Any] = []
+    with console_of(tmp_path, small_config(), Twin, is_twin=False) as console:
+
+        def enabled() -> str:
+            """The reply to a new page, which names the image that it shows, if it shows one."""
+            page, video = console.page(), console.page("/video")
+            image, newest = 0, console.control.images.newest
+            while image < newest:
+                image = receive_image(video)[0]["sequence"]
+            page.on_latency = latencies.append
+            video.send({"type": "drawn", "image": image, "width": 180})
+            rest = {"type": "servo", "axes": (0, 0, 0), "is_holding": False}
+
+            def is_answered() -> bool:
+                page.send({**rest, **page.fields(image)})  # or the page would be away
+                return page.replies[-1]["what"] == "enable"
+
+            page.take()
+            page.wait(lambda: page.replies)
+            assert not is_answered()
+            page.send({"type": "action", "name": "enable", **page.fields(image)})
+            page.wait(is_answered, PERIOD)
+            reply = page.replies[-1]
+            page.wait(lambda: not reply["is_accepted"] or console.control.images.newest > newest)
+            page.send({"type": "stop"})
+            page.wait(lambda: console.control.run is None)
+            page.close()
+            video.close()
+            return str(reply["reason"])
+
+        assert [enabled(), enabled()] == ["", ""]
+    assert not latencies  # that of an old image is none
 
 
 class Slow(Arm):
@@ -271,7 +322,7 @@ class Unconfirmed(Arm):
 
 @pytest.mark.parametrize("where", ["close", "step"])
 def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
-    tmp_path: Path, where: str
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, where: str
 ) -> None:
     arm = Unconfirmed(2)
     note = "bend_x: quick stop is not confirmed. Use the emergency stop: the motor may be moving"
@@ -297,11 +348,35 @@ def test_a_stop_that_the_drives_do_not_confirm_is_not_shown_as_one(
         assert message.startswith("THE MOTORS MAY STILL MOVE: ")
         assert note in message
         assert drives == "THE MOTORS MAY STILL MOVE"
+        with pytest.raises(StateError, match="emergency stop") as raised:
+            control.shut_down()
+        assert note in str(raised.value)
+        assert raised.value.exit_status == STOPPED
+        assert note in caplog.text
         arm.close_error = arm.step_error = None
         control.operator.enable()
         control.open()
         assert shown()[::2] == ("ready", "enabled")
         session._publisher.close()
+
+
+def test_an_end_while_motors_are_enabled_tells_that_they_may_move(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = Unconfirmed(2)
+
+    def reset() -> Sample:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(arm, "reset", reset)
+    arm.close_error = StateError("bend_x", "quick stop is not confirmed", "See to the rig")
+    with control_of(tmp_path, arm) as control:
+        with pytest.raises(KeyboardInterrupt):
+            control.open()
+        with pytest.raises(StateError, match=r"may still move .bend_x: quick") as raised:
+            control.shut_down()
+        assert raised.value.exit_status == STOPPED
+        control.unconfirmed = ""
 
 
 @pytest.mark.parametrize("is_simulated", [True, False])
@@ -338,6 +413,74 @@ def test_neither_a_hold_nor_a_warning_ends_with_its_run(tmp_path: Path, is_simul
         assert execute(4, name="acknowledge").is_accepted
         assert shown()[1] == []
         session._publisher.close()
+
+
+@pytest.mark.parametrize("by", ["STOP", "profile"])
+def test_a_take_ends_with_its_log(tmp_path: Path, by: str) -> None:
+    paths = [tmp_path / f"console-{number}.mcap" for number in (1, 2)]
+    with control_of(tmp_path, Arm(2)) as control:
+        actions = Actions(control, lambda: None)
+        control.lease.take(1)
+        control.open()
+
+        def record(number: int) -> str:
+            message = Action(control.lease.number, number, 0, "record")
+            return actions.execute(Received(1, time.monotonic(), message)).reason
+
+        assert record(1) == f"take 1, lossless, into {paths[0]}"
+        if by == "STOP":
+            control.stop("STOP by page 1")
+            control.operator.enable()
+            control.open()
+        else:
+            control.restart(control.config.replace(profile="paper"))
+        assert not control.is_recording
+        assert control.run.log.image_format == "jpeg"
+        assert record(2) == f"take 2, lossless, into {paths[1]}"
+        assert record(3).startswith(f"take 2 is in {paths[1]}, from 0 to 0 s")
+    for number, end in ((1, "the take ends with its log"), (2, "take 2 ends")):
+        events = read_log(paths[number - 1]).events.values()
+        notes = [event.text for event in events if isinstance(event, Request)]
+        takes = [note for note in notes if "take" in note]
+        assert takes == [f"note take {number} begins", f"note {end}"]
+
+
+def test_nothing_is_known_of_a_rig_that_is_off_but_its_last_log(tmp_path: Path) -> None:
+    with control_of(tmp_path, Arm(2)) as control:
+        session = session_of(control)
+
+        def shown() -> State:
+            return session_state(control, session._publisher.log, time.monotonic())
+
+        assert shown().tip == (None, None)
+        assert shown().log == LogState()
+        control.open()
+        session._tick(control.run)
+        assert shown().tip == (0.0, 0.0)
+        path = str(control.run.path)
+        deadline = time.monotonic() + 20
+        while shown().log.path != path:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        control.run.log._journal.failure = "the disk is full"
+        control.stop("STOP by page 1")
+        assert control.run is None
+        assert shown().tip == (None, None)
+        assert (shown().log.path, shown().log.failure) == (path, "the disk is full")
+        ended = session_state(control, LogState(path, 5, remaining=9.0), time.monotonic()).log
+        assert ended.remaining is None
+        session._publisher.close()
+
+
+@pytest.mark.parametrize("config", [Config(), tautscope.axes(1, width_limit=1.0)])
+def test_what_is_slow_at_first_is_done_before_motors_are_enabled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: Config
+) -> None:
+    monkeypatch.setattr(vision, "_tables", {})
+    rig = PacedRig(lambda: Arm(1), 0.005, is_simulated=False)
+    with ThreadPoolExecutor(1) as executor:
+        RigControl(config, rig, tmp_path, executor)
+    assert bool(vision._tables) == (not config.dof)
 
 
 def broken(*_: object) -> Sample:

@@ -1,17 +1,22 @@
 """The console without a browser: lease, motion, stop, faults of the connection, log."""
 
-import json
 import os
 import signal
 import time
 from pathlib import Path
-from typing import Any
 
 import cv2
-import numpy as np
 import pytest
 from console.pages import PERIOD
-from running import TIMEOUT, Page, RunningConsole, rests, running_console, small_config
+from running import (
+    TIMEOUT,
+    Page,
+    RunningConsole,
+    receive_image,
+    rests,
+    running_console,
+    small_config,
+)
 from tautscope.log.reader import Request, read_log
 from tautscope.log.replay import replay_same
 
@@ -262,15 +267,3 @@ def test_images_are_as_large_as_the_largest_page_shows_them(console: RunningCons
     wait_for(full)
     small.close()
     large.close()
-
-
-def receive_image(video: Page) -> tuple[dict[str, Any], np.ndarray]:
-    """The next image of a connection, with what is drawn over it."""
-    message = video.socket.recv(timeout=20)
-    assert isinstance(message, bytes)
-    length = int.from_bytes(message[:4], "little")
-    overlay = json.loads(message[4 : 4 + length])
-    pixels = np.frombuffer(message[4 + length :], np.uint8)
-    image = cv2.imdecode(pixels, cv2.IMREAD_COLOR)
-    assert image is not None
-    return overlay, image

@@ -19,7 +19,10 @@ from tautscope.cli import main
 from tautscope.config import Sine, axes
 from tautscope.log.export import export_csv
 from tautscope.log.writer import LogWriter
+from tautscope.loop.measurement import Tip
+from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.references import OperatorMotion, SineSequence
+from tautscope.loop.rig import Sample
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
 
@@ -163,6 +166,23 @@ def test_status_warnings_and_requests_are_texts(files: Files, tmp_path: Path) ->
         newest = max(row["rig_time"] for row in rows if row["rig_time"] <= now)
         shown = [text for row, text in zip(rows, texts, strict=True) if row["rig_time"] == newest]
         assert f": {frame['status']}, " in shown[-1]
+
+
+def test_times_that_are_far_off_are_exported(tmp_path: Path) -> None:
+    """Above what int64 [ns] holds they are clipped, to what a message states."""
+    config = axes(1, width_limit=1.0)
+    loop, tip = HysteresisReduction(config), Tip(np.zeros(1), -1e12)
+    loop.step(np.zeros(1), 0.0)
+    with LogWriter(tmp_path / "run.mcap", config) as log:
+        for time in (0.0, 1e12):
+            log.tick(Sample(time, np.zeros(1)), np.zeros(1), np.zeros(1))
+        log.measurement(0.0, tip, loop.on_sample(tip))
+    assert main(["export", str(tmp_path / "run.mcap"), "--rerun", str(tmp_path / "run.rrd")]) == 0
+    found = rows_of(tmp_path / "run.rrd")
+    bound = (2**31 - 1) * 10**9
+    assert [row["rig_time"] for row in found["/log/status"]] == [-bound]
+    _, *rows = found["/position/axis_1/reference"]
+    assert [row["rig_time"] for row in rows] == [0, bound]
 
 
 def views_of(path: Path) -> dict[str, str]:

@@ -11,12 +11,13 @@ from typing import IO, Any
 import numpy as np
 import pytest
 from drawn import DrawnRig
-from tautscope.config import Config
+from tautscope.config import Config, axes
 from tautscope.errors import EMERGENCY_STOP, FieldError, OutputError, RecordError
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.writer import LogWriter
+from tautscope.loop.measurement import Tip
 from tautscope.loop.reduction import HysteresisReduction
-from tautscope.loop.rig import Sample
+from tautscope.loop.rig import Frame, Sample
 
 
 def test_an_existing_file_is_not_overwritten(tmp_path: Path, config: Config) -> None:
@@ -132,6 +133,25 @@ def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None
     (tmp_path / "run.mcap").write_bytes(b"")
     with pytest.raises(RecordError, match="a file as it was when it was read"):
         read.image(kept)
+
+
+@pytest.mark.parametrize("off", [1e12, 1.8e9, -1.8e9, -1e12, 1e308])
+def test_a_time_that_is_far_off_is_in_the_log(tmp_path: Path, config: Config, off: float) -> None:
+    """As of a rig that gives the wall clock, or nanoseconds; a stamp has a range, a number none."""
+    arm = axes(3, width_limit=1.0)
+    tip, frame = Tip(np.zeros(3), off), Frame(DrawnRig(config).reset().frame.image, off, 1)
+    for kind, settings in (("frame", config), ("measurement", arm)):
+        loop, path = HysteresisReduction(settings), tmp_path / f"{kind}.mcap"
+        loop.step(np.zeros(3), 0.0)
+        with LogWriter(path, settings) as log:
+            for time_ in (0.0, 0.01, off):
+                log.tick(Sample(time_, np.zeros(3)), np.zeros(3), np.zeros(3))
+            seen, update = (frame, loop.on_frame) if kind == "frame" else (tip, loop.on_sample)
+            getattr(log, kind)(0.01, seen, update(seen))
+        assert log.close().is_complete
+        *ticks, found = read_log(path).events.values()
+        assert ticks[-1].sample.time == off
+        assert found.row["captured_at"] == off
 
 
 def test_images_are_lossless_while_that_is_requested(tmp_path: Path, config: Config) -> None:

@@ -1,6 +1,7 @@
 """The node with a rig of one's own: a stop during its reset, which may move motors."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,30 @@ def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
         both.tick()
         assert both.control.fault.endswith("; bend_x: quick stop is not confirmed")
         assert both.control.fault in [each.data for each in both.drain(both.warnings)]
+
+
+class OffClock(Arm):
+    """Its sensor's clock is not the rig's."""
+
+    off = 0.0
+
+    def step(self, command: ArrayLike) -> Sample:
+        sample = super().step(command)
+        return replace(sample, measurement=Tip(np.zeros(2), self.off))
+
+
+@pytest.mark.parametrize("off", [1e12, -1.8e9, -1e12, 1e308])
+def test_a_measurement_whose_time_is_far_off_ends_nothing(tmp_path: Path, off: float) -> None:
+    arm, config = OffClock(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration, arm.off = 0.0, off
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        both.enable(np.zeros(2))
+        for _ in range(5):
+            both.tick()
+        assert both.control.run is not None
+        assert both.control.run.loop.updates > 0
+        assert not both.control.run.log.failure
 
 
 class Unconfirmed(Arm):

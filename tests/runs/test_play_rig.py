@@ -1,6 +1,7 @@
 """The simulated robot of plays is any robot of a configuration."""
 
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tautscope.loop.actuators import with_actuators
 from tautscope.loop.references import OperatorMotion
 from tautscope.report.operator_motion import motion_of
 from tautscope.runs.recording import Floats
-from tautscope.runs.rigs import rig_maker
+from tautscope.runs.rigs import GROUP, rig_maker
 
 
 def test_each_tip_is_a_play_with_gain_and_zero() -> None:
@@ -81,6 +82,16 @@ def test_a_rig_of_another_period_is_closed(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(ConfigError, match=r"control\.period.*that of the rig, 0\.01 s"):
         rig_maker("tautscope:SlowRig")(axes(1, width_limit=1.0))
     assert SlowRig.closed == 1
+
+
+@pytest.mark.parametrize("value", ["tautscope.missing:Arm", "tautscope:Missing"])
+def test_an_entry_point_that_cannot_be_loaded_is_named(
+    monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    found = [EntryPoint("arm", value, GROUP)]
+    monkeypatch.setattr("tautscope.runs.rigs.entry_points", lambda **_: found)
+    with pytest.raises(ConfigError, match=r"^rig: got 'arm', expected .*[mM]issing"):
+        rig_maker("arm")
 
 
 def test_a_configuration_alone_is_a_rig() -> None:

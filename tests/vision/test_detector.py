@@ -1,5 +1,6 @@
 """Frame to markers: the segmentation against OpenCV, what is refused, what is left behind."""
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -11,6 +12,7 @@ from scenes import scenes
 from tautscope import _core
 from tautscope.config import Config
 from tautscope.errors import ConfigError, FieldError, FrameError
+from tautscope.loop import vision
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.vision import MarkerDetector
 
@@ -166,6 +168,23 @@ def test_threads_may_share_a_detector() -> None:
         together = list(pool.map(lambda image: detector.detect(image).regions, images))
     assert together == alone
     assert len(set(alone)) > 1
+
+
+def test_threads_that_make_detectors_at_once_make_one_posture_table(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made, workspace = [], vision._workspace
+
+    def slow(settings: Config) -> NDArray[np.float64]:
+        made.append(settings)
+        time.sleep(0.1)
+        return workspace(settings)
+
+    monkeypatch.setattr(vision, "_tables", {})
+    monkeypatch.setattr(vision, "_workspace", slow)
+    with ThreadPoolExecutor(3) as pool:
+        list(pool.map(MarkerDetector, [Config()] * 3))
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize(

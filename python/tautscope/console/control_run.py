@@ -14,10 +14,12 @@ from tautscope.console.uncompensated import MODEL, SECOND_PLANT, ComparedRig, Pl
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
+from tautscope.log.header import header_messages
 from tautscope.log.writer import LogWriter
+from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
-from tautscope.loop.reduction import Report
+from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.rig import Frame, Rig, Sample
 from tautscope.runs.control_loop import ControlLoop
 
@@ -29,6 +31,14 @@ _TIMES = 200_000
 """Number of ticks whose times are kept."""
 _KEPT = 200
 """Number of ticks for which the tip without compensation is kept, longer than an image's way."""
+
+
+def warm_up(config: Config) -> None:
+    """Use what is slow at first, the log's messages and the detector, before motors are enabled."""
+    header_messages(config, True, (), 0)
+    if not config.dof:
+        blank = np.zeros(FrameLayout(config.camera).shape, np.uint8)
+        HysteresisReduction(config).prepare_detection(Frame(blank, 0.0, 0))()
 
 
 class ReferenceSource(Protocol):

@@ -96,12 +96,13 @@ class _Viewer:
     """A page that gets images.
 
     Attributes:
-        sent: Sequences of images sent and not drawn yet, with the times of their arrival.
+        sent: Sequences of images sent and not drawn yet, with the times of their arrival; None of
+            the first, which may be an old one.
         may_send: Set when one may be sent.
         width: At which it shows images [px]; infinite until it is known.
     """
 
-    sent: dict[int, float] = field(default_factory=dict)
+    sent: dict[int, float | None] = field(default_factory=dict)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
     width: float = math.inf
 
@@ -143,6 +144,7 @@ class ImageFeed:
     async def send(self, connection: ServerConnection) -> None:
         """Send the newest image to a page whenever it has drawn an earlier one."""
         viewer = self._viewers[connection] = _Viewer()
+        viewer.may_send.set()  # while a rig is off, or a recording pauses, no other image comes
         sequence = 0
         try:
             while True:
@@ -150,8 +152,8 @@ class ImageFeed:
                 viewer.may_send.clear()
                 if self._sequence == sequence or len(viewer.sent) >= IN_FLIGHT:
                     continue
+                viewer.sent[self._sequence] = self._arrived_at if sequence else None
                 sequence = self._sequence
-                viewer.sent[sequence] = self._arrived_at
                 await connection.send(self._newest)
         except ConnectionClosed:
             pass

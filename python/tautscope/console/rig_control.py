@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.console.control_run import ControlRun
+from tautscope.console.control_run import ControlRun, warm_up
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
-from tautscope.errors import EMERGENCY_STOP, TautscopeError, described
+from tautscope.errors import EMERGENCY_STOP, STOPPED, StateError, TautscopeError, described
 from tautscope.hardware.rig import HardwareRig
+from tautscope.log.writer import LogWriter
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Rig, Sample, check_sample, disable, reset_unless
 
@@ -34,6 +35,7 @@ class RigControl:
         images: When images were published, or without images states.
         kinematics: Of an instrument with [[dof]], if it has positions.
         run: The present run; None while the rig is off.
+        log: That of the last run; None before one.
         fault: Why the rig is off; empty if it is not, or was never on.
         unconfirmed: Why the motors may still move although they were stopped; empty if they do not.
         is_interrupted: Whether opening has to end, or had to: by STOP, or without a page.
@@ -51,6 +53,7 @@ class RigControl:
         self.lease = Lease(self.images)
         self.operator = OperatorInput(config, self.lease)
         self.run: ControlRun | None = None
+        self.log: LogWriter | None = None
         self.fault = self.unconfirmed = ""
         self.is_opening = self.is_interrupted = self.is_recording = False
         self.stopped_at: float | None = None
@@ -60,6 +63,7 @@ class RigControl:
         self.while_opening: Callable[[], None] = lambda: None
         self.kinematics = build_kinematics(config) if config.dof else None
         self._rig, self._executor = rig, executor
+        warm_up(config)
         if isinstance(rig, HardwareRig):
             rig.warn = self.warn
         self._runs = 0
@@ -147,24 +151,37 @@ class RigControl:
             self.run.log.image_format = "png" if is_recording else "jpeg"
 
     def shut_down(self) -> None:
-        """Stop the motors, release the rig, and wait for the logs."""
+        """Stop the motors, release the rig, and wait for the logs.
+
+        Raises:
+            StateError: The motors may still move: their drives did not confirm the last stop.
+        """
         self.close()
+        self._stop_motors("")  # of a rig that was being enabled
         self._rig.close()
         for thread in self._endings:
             thread.join()
+        if self.unconfirmed:
+            what = f"the motors may still move ({self.unconfirmed})"
+            error = StateError("rig", what, EMERGENCY_STOP)
+            error.exit_status = STOPPED
+            raise error
 
     def _stop_motors(self, fault: str, *, is_disabling: bool = False) -> None:
-        self.fault = fault
+        self.fault, unconfirmed = fault, ""
         try:
             if self.is_hardware and is_disabling:
                 disable(self._rig)
             elif self.is_hardware:
                 self._rig.close()
         except TautscopeError as error:
-            self.unconfirmed = described(error)
-            self.fault = f"{fault}; {self.unconfirmed}" if fault else self.unconfirmed
+            unconfirmed = described(error)
+            self.fault = f"{fault}; {unconfirmed}" if fault else unconfirmed
         if EMERGENCY_STOP in fault:
-            self.unconfirmed = fault
+            unconfirmed = fault
+        if unconfirmed:
+            _LOG.warning("%s", unconfirmed)
+            self.unconfirmed = unconfirmed
         self.ended_at = time.monotonic()
 
     def _start_run(self, sample: Sample) -> None:
@@ -179,10 +196,13 @@ class RigControl:
             self._stop_motors(described(error))
             return
         self.run.set_compensation(self.compensation)
-        self.record(is_recording=self.is_recording)
+        self.log = self.run.log
 
     def _end(self, run: ControlRun) -> None:
-        """Keep the warnings, and close the log in the background, because the disk may be slow."""
+        """End the take, keep the warnings, and close the log in the background: disks are slow."""
+        if self.is_recording:  # a take is in one log
+            run.note("the take ends with its log")
+            self.is_recording = False
         self._warnings.update(run.loop.supervision.latched)
         thread = threading.Thread(target=run.log.close, name="closing")
         self._endings = [each for each in self._endings if each.is_alive()]

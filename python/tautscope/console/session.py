@@ -40,7 +40,11 @@ class Session:
         control.while_opening = self._idle_opening
 
     def main(self) -> None:
-        """Run until it has to end; the motors are stopped and the log is closed on every exit."""
+        """Run until it has to end; the motors are stopped and the log is closed on every exit.
+
+        Raises:
+            StateError: As `RigControl.shut_down`.
+        """
         control = self._control
         try:
             if not control.is_hardware:
@@ -53,8 +57,10 @@ class Session:
                 else:
                     self._tick(control.run)
         finally:
-            control.shut_down()
-            self._publisher.close()
+            try:
+                control.shut_down()
+            finally:
+                self._publisher.close()
 
     def _tick(self, run: ControlRun) -> None:
         control = self._control

@@ -34,7 +34,10 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
         _add_run(state, run)
         if control.config.dof:
             state.show_truth(run.sample.true_state, control.kinematics)
-        state.log = replace(log, dropped=run.log.dropped, failure=run.log.failure)
+    if (written := control.log) is not None:
+        state.log = replace(log, dropped=written.dropped, failure=written.failure)
+    if run is None:
+        state.log.remaining = None  # it is that of a log that grows
     state.image.sequence = control.images.newest
     state.motion, message = _motion(control)
     state.message = message[:LONGEST_REASON]

@@ -34,7 +34,7 @@ def start_console(
 
     Raises:
         ConfigError: The port is taken, or there is no kinematics of this name.
-        StateError: The web server ended.
+        StateError: The web server ended, or motors may still move.
     """
     with (
         realtime_executor("vision", VISION) as executor,

@@ -163,9 +163,9 @@ def blank_state(mode: Mode, config: Config) -> State:
     """The state of an instrument that is off."""
     count = len(config.dofs)
     state = State(mode, config.profile)
-    state.reference = state.command = state.applied = state.tip = (0.0,) * count
+    state.reference = state.command = state.applied = (0.0,) * count
     state.delta_minus = state.delta_plus = (0.0,) * count
-    state.uncompensated = (None,) * count
+    state.tip = state.uncompensated = (None,) * count
     state.score = [None] * count
     state.width_std = state.image.deviation = (None,) * count
     state.scale, state.clutch = (0.4,) * count, (True,) * count

@@ -9,6 +9,14 @@ from tautscope.config import CameraConfig
 from tautscope.log.cdr import Message
 from tautscope.loop.reduction import Report
 
+LONGEST = 2.0**31 - 1
+"""Largest time that a builtin_interfaces/msg/Time states [s since 1970]: a rig may give any."""
+
+
+def nanoseconds_of(seconds: float) -> int:
+    """A time span in [ns], within +-`LONGEST`."""
+    return round(min(max(seconds, -LONGEST), LONGEST) * 1e9)
+
 
 def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
     """std_msgs/msg/Header for a wall clock time [ns]."""
@@ -16,8 +24,9 @@ def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
 
 
 def stamp_of(nanoseconds: int) -> dict[str, int]:
-    """builtin_interfaces/msg/Time for a wall clock time [ns]."""
-    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
+    """builtin_interfaces/msg/Time for a wall clock time [ns], the nearest that it can state."""
+    sec, nanosec = divmod(min(max(nanoseconds, 0), nanoseconds_of(LONGEST)), 10**9)
+    return {"sec": sec, "nanosec": nanosec}
 
 
 def joint_state(header: Message, names: Sequence[str], values: Iterable[float]) -> dict[str, Any]:

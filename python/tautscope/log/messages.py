@@ -14,7 +14,15 @@ from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import topics
 from tautscope.log.cdr import Message
-from tautscope.log.fields import diagnostics, header_of, joint_state, multi_array, offsets, stamp_of
+from tautscope.log.fields import (
+    diagnostics,
+    header_of,
+    joint_state,
+    multi_array,
+    nanoseconds_of,
+    offsets,
+    stamp_of,
+)
 from tautscope.log.measurements import measurement_messages, read_measurement, value_names
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.measurement import Measurement
@@ -42,8 +50,8 @@ class Clock:
     epoch: int
 
     def nanoseconds(self, time: float) -> int:
-        """The wall clock time [ns] of a rig time [s]."""
-        return self.epoch + round((time - self.start) * 1e9)
+        """The wall clock time [ns] of a rig time [s]; a rig time may be far off."""
+        return max(self.epoch + nanoseconds_of(time - self.start), 0)
 
 
 class Codec:

@@ -16,6 +16,7 @@ from tautscope.config import Config
 from tautscope.errors import OutputError
 from tautscope.figure_style import AMBER, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, YELLOW
 from tautscope.log import topics
+from tautscope.log.fields import LONGEST
 from tautscope.log.mcap_records import Damage, read_messages
 from tautscope.log.reader import Log, Update, read_log
 from tautscope.runs.output_folder import new_file
@@ -184,7 +185,8 @@ class _Chunks:
 
 
 def _nanoseconds(times: NDArray[np.float64]) -> NDArray[np.int64]:
-    return np.round(times * 1e9).astype(np.int64)
+    # Any time of a rig, within what a message of its log states.
+    return np.round(np.clip(times, -LONGEST, LONGEST) * 1e9).astype(np.int64)
 
 
 def _rgba(colour: str) -> int:

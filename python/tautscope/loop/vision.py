@@ -7,6 +7,7 @@ import itertools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
+from threading import Lock
 from typing import NamedTuple
 
 import msgspec
@@ -262,6 +263,7 @@ def workspace_starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 _MOST_TABLES = 8
 _tables: dict[Hashable, _core.PostureTable] = {}
+_tables_lock = Lock()
 
 
 def _posture_table(config: Config, model: _core.FeatureModel) -> _core.PostureTable:
@@ -272,11 +274,12 @@ def _posture_table(config: Config, model: _core.FeatureModel) -> _core.PostureTa
     camera = config.camera
     lens = camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion
     key = (config.instrument, config.experiment, lens, camera.camera_from_guide)
-    table = _tables.get(key)
-    if table is None:
-        for oldest in list(_tables)[: 1 - _MOST_TABLES]:
-            _tables.pop(oldest, None)
-        table = _tables[key] = _core.PostureTable(model, _workspace(config))
+    with _tables_lock:
+        table = _tables.get(key)
+        if table is None:
+            for oldest in list(_tables)[: 1 - _MOST_TABLES]:
+                del _tables[oldest]
+            table = _tables[key] = _core.PostureTable(model, _workspace(config))
     return table
 
 

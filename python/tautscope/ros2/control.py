@@ -7,14 +7,11 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
-import numpy as np
-
 from tautscope.config import Config
-from tautscope.console.control_run import ControlRun
+from tautscope.console.control_run import ControlRun, warm_up
 from tautscope.errors import ConfigError, MessageError, TautscopeError, described
-from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.operating_state import STATE_COMMANDS, OperatingState, StateMachine
-from tautscope.loop.rig import Frame, Rig, disable, reset_unless
+from tautscope.loop.rig import Rig, disable, reset_unless
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.driver import DriverRig
@@ -216,6 +213,7 @@ class NodeControl:
         self.fault, self._is_disabling = "", False
         self._states.goal = OperatingState.DISABLED
         self._telemetry.state(self.operating_state, is_busy=True)
+        warm_up(self._config)
         sample = reset_unless(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
         self._sensors.reset()
@@ -225,10 +223,6 @@ class NodeControl:
         run = ControlRun(
             self._config, rig, sample, self._source, path=path, executor=self._executor
         )
-        if not self._config.dof:
-            # The detector is made and used now, because its first use is slow.
-            blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
-            run.loop.prepare_detection(Frame(blank, sample.time, 0))()
         run.set_compensation(float(self.parameters["compensation"]))
         self.run = run
         self._states.accept("enable", self._reaction)

@@ -79,7 +79,7 @@ class Telemetry:
 
     def update(self, run: ControlRun, source: Frame | Measurement, report: Report) -> None:
         """Publish an update; of an image also the camera, and the image if anybody receives it."""
-        age = round((run.sample.time - report.captured_at) * 1e9)
+        age = fields.nanoseconds_of(run.sample.time - report.captured_at)
         captured = self._clock.wall() - age
         self._tip.publish(messages.tip_state(captured, self._joints, report))
         self._offsets.publish(fields.offsets(self._joints, report))

@@ -26,8 +26,11 @@ def rig_maker(name: str, **arguments: Any) -> Callable[[Config], Rig]:
         ConfigError: There is none of this name, or what it makes is no `Rig`.
     """
     field, allowed = "rig", f'"module:Class", or the name of an entry point "{GROUP}"'
-    found = entry_points(group=GROUP, name=name)
-    made = next(iter(found)).load() if found else named_class(field, name, allowed)
+    found = next(iter(entry_points(group=GROUP, name=name)), None)
+    try:
+        made = named_class(field, name, allowed) if found is None else found.load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(field, name, f"{allowed} ({error})") from None
     try:
         parameters = inspect.signature(made).parameters.values()
     except (TypeError, ValueError):

@@ -19,6 +19,9 @@ const CAPTIONS = [
   ["contact offsets over time", sign("offset", "contact offsets")],
 ];
 
+/** Whether the rig is off: there is no tick of it, and zeros stand for what is not known. */
+export const isOff = ({ replay, late }) => !replay && !late[1];
+
 /** All charts; `add` samples the states, which are drawn one degree of freedom at a time. */
 export class Charts {
   constructor(parent, dofs) {
@@ -73,14 +76,17 @@ export class Charts {
   /** Numbers beside the charts. */
   describe(state) {
     this.dofs.forEach(({ scale, unit, digits }, k) => {
-      const number = (value) => (value === null ? "–" : `${(scale * value).toFixed(digits)} ${unit}`.replace("-", "−"));
+      // What rounds to zero has no sign.
+      const rounded = (value) => (Number((scale * value).toFixed(digits)) || 0).toFixed(digits).replace("-", "−");
+      const number = (value) => (value === null ? "–" : `${rounded(value)} ${unit}`);
       const show = (name, text) => (this.cards[k].querySelector(name).textContent = text);
       show(".error", state.tip[k] === null ? "–" : number(state.reference[k] - state.tip[k]));
-      const slack = state.delta_plus[k] - state.delta_minus[k];
+      const slack = isOff(state) ? null : state.delta_plus[k] - state.delta_minus[k];
       const certainty = state.width_std[k] === null ? "" : ` ± ${number(state.width_std[k])}`;
       show(".offsets", `tip ± ${number(state.image.deviation[k])}, slack ${number(slack)}${certainty}`);
       const score = state.score[k]?.map(number);
-      show(".score", score ? `Last minute: ${score[0]} off; without compensation ${score[1]}` : "Not moved yet");
+      const none = isOff(state) ? "–" : "Not moved yet";
+      show(".score", score ? `Last minute: ${score[0]} off; without compensation ${score[1]}` : none);
     });
   }
 
@@ -91,7 +97,7 @@ export class Charts {
   #draw() {
     this.next = (this.next + 1) % this.dofs.length;
     const { times, dofs: { [this.next]: { size } } } = this;
-    if (times.length < 2 || document.hidden) return;
+    if (!times.length || document.hidden) return;
     const [time, loops, offsets] = this.cards[this.next].querySelectorAll("canvas");
     const { reference, command, tip, true: truth, without, minus, plus } = this.rows[this.next];
     const range = [times.at(-1) - LENGTH * SAMPLE, times.at(-1)];

@@ -99,10 +99,11 @@ export class ImageView {
     return u >= 0 && v >= 0 && u <= width && v <= height ? [u, v] : null;
   }
 
-  /** Images per second of the last 50. */
+  /** Images per second of the last 50; 0 if there was none for a second. */
   get rate() {
     const times = this.drawn;
-    return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
+    if (times.length < 2 || performance.now() - this.drawnAt > 1000) return 0;
+    return (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
   }
 
   #outlines(outlines, colour, dashes, isFilled = false) {

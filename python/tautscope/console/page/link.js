@@ -1,6 +1,7 @@
 // Two connections: commands and states on one, images on the other, so that images never delay commands.
 
 const RETRY = 1000; // ms
+export const NO_TOKEN = "no token"; // why the server closes a connection
 
 /** The token of the address; it is removed from the address bar, and kept for a reload of this tab. */
 export function readToken() {
@@ -12,7 +13,7 @@ export function readToken() {
   return found ?? sessionStorage.getItem("token") ?? "";
 }
 
-/** A connection that sends the token first and is opened again when it ends. */
+/** A connection that sends the token first and is opened again when it ends; `onClose` gets the server's reason. */
 export class Link {
   constructor(path, token, { onMessage, onClose = () => {} }) {
     Object.assign(this, { path, token, onMessage, onClose });
@@ -24,8 +25,8 @@ export class Link {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => socket.send(JSON.stringify({ type: "hello", token: this.token }));
     socket.onmessage = (event) => this.onMessage(event.data);
-    socket.onclose = () => {
-      this.onClose();
+    socket.onclose = (event) => {
+      this.onClose(event.reason);
       setTimeout(() => this.open(), RETRY);
     };
     this.socket = socket;

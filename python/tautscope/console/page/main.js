@@ -1,14 +1,15 @@
 // The operator's console: connects the two links with what is shown and with the controls.
 
-import { Charts } from "./charts.js";
+import { Charts, isOff } from "./charts.js";
 import { ImageView } from "./image.js";
-import { Link, readToken } from "./link.js";
+import { Link, NO_TOKEN, readToken } from "./link.js";
 import { PathView } from "./path.js";
 import { Pointing } from "./point.js";
 import { Sound } from "./sound.js";
 import { Steering, isText } from "./steer.js";
 
 const LOST = 500; // ms without a state, or without an image
+const SOUGHT = 300; // ms until the time that was asked for is shown
 const REFUSED = 5000; // ms for which a refusal is shown with the state
 const MODES = { twin: "SIMULATED", hardware: "REAL MOTORS", replay: "RECORDING" };
 const WORDS = {
@@ -24,10 +25,12 @@ let layout = null;
 let charts, steering, rows;
 let state = null;
 let client = null;
+let hasToken = true;
 let receivedAt = -Infinity;
 let motion = "lost";
 let latched = "";
 let refusal = null;
+let soughtAt = -Infinity;
 const sequences = { servo: 0, request: 0 };
 const sound = new Sound($("sound"));
 const token = readToken();
@@ -65,6 +68,7 @@ const control = new Link("/control", token, {
     const message = JSON.parse(data);
     if (message.type === "welcome") {
       client = message.client;
+      hasToken = true;
       if (!layout) build(message.layout);
     } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
@@ -74,14 +78,16 @@ const control = new Link("/control", token, {
     } else {
       state = { ...message.state, latency: message.latency };
       receivedAt = performance.now();
+      if (isOff(state)) return;
       charts.add(state);
       if (state.positions) path.add(state);
       updates.push([state.time, state.image.updates]);
       if (updates.length > 100) updates.shift();
     }
   },
-  onClose() {
+  onClose(reason) {
     client = null;
+    hasToken = reason !== NO_TOKEN;
   },
 });
 const video = new Link("/video", token, { onMessage: (data) => view.receive(data) });
@@ -100,7 +106,10 @@ $("play").addEventListener("click", () => {
   const [time, duration, isPlaying] = state.replay;
   seek(!isPlaying && time >= duration - 0.1 ? 0 : null, !isPlaying);
 });
-$("seek").addEventListener("input", () => seek(Number($("seek").value), state.replay[2]));
+$("seek").addEventListener("input", () => {
+  soughtAt = performance.now();
+  seek(Number($("seek").value), state.replay[2]);
+});
 addEventListener("keydown", (event) => {
   if (event.code === "KeyC" && !event.repeat && !isText(event.target) && !event.ctrlKey && !event.metaKey) $("compensate").click();
 });
@@ -127,7 +136,7 @@ function build(found) {
   $("legend").hidden = !seesBands;
   charts = new Charts($("charts"), dofs);
   const send = (message) => control.send(message);
-  steering = new Steering({ count: dofs.length, pointing, getCommand: () => command("servo"), send, onStop: stop });
+  steering = new Steering({ count: dofs.length, pointing, hasLease, getCommand: () => command("servo"), send, onStop: stop });
   rows = dofs.map(controlsOf);
 }
 
@@ -167,18 +176,18 @@ function facts() {
     "image to screen": state.latency ? `${state.latency.map((time) => (1000 * time).toFixed(0)).join(" ms, 95 %: ")} ms` : "–",
     "images dropped": image.dropped,
   };
-  const [since, before] = updates[0];
+  const [since, before] = updates[0] ?? [0, 0];
   const measured = state.time > since ? (image.updates - before) / (state.time - since) : 0;
   const list = {
     profile: state.profile,
     [layout.sees_bands ? "images" : "measurements"]:
       `${(layout.sees_bands ? view.rate : measured).toFixed(1)}/s, ${layout.sees_bands || image.updates ? image.status : "none"}`,
-    "capture to estimate": `${(1000 * image.age).toFixed(0)} ms`,
+    "capture to estimate": image.updates ? `${(1000 * image.age).toFixed(0)} ms` : "–",
     ...ofImages,
     drives: state.drives,
     "late ticks": late[1] ? `${late[0]} of ${late[1]}` : "–",
     "commands refused": refused,
-    log: log.failure || `${log.path}, ${megabytes(log.size)}, room for ${duration(log.remaining)}`,
+    log: log.failure || (log.path ? `${log.path}, ${megabytes(log.size)}, room for ${duration(log.remaining)}` : "–"),
     "not logged": log.dropped,
   };
   $("facts").innerHTML = Object.keys(list).map(() => "<div><dt></dt><dd></dd></div>").join("");
@@ -258,7 +267,7 @@ function showTime() {
   if (!state.replay) return;
   const [time, length, isPlaying] = state.replay;
   $("seek").max = length;
-  show($("seek"), time);
+  if (!$("seek").matches(":active") && performance.now() - soughtAt > SOUGHT) $("seek").value = time;
   $("at").textContent = `${time.toFixed(1)} of ${length.toFixed(1)} s`;
   $("play").textContent = isPlaying ? "Pause" : "Play";
 }
@@ -272,12 +281,13 @@ function update() {
     motion = document.body.dataset.motion = now;
     $("motion").textContent = WORDS[now];
   }
+  if (!hasToken) $("message").textContent = "This address has no valid token: open the one that the console printed.";
   if (!layout) return;
   const hasImage = layout.sees_bands || view.sequence > 0;
   const isOld = performance.now() - view.drawnAt > LOST;
   $("stale").hidden = !isOld || !hasImage || (!isLost && state.replay !== null && !state.replay[2]);
   if (isLost) {
-    $("message").textContent = "No data from the control process. What this page moved rests; another page may steer. If in doubt, use the emergency stop.";
+    if (hasToken) $("message").textContent = "No data from the control process. What this page moved rests; another page may steer. If in doubt, use the emergency stop.";
     return;
   }
   const isRefused = refusal && performance.now() - refusal.at < REFUSED;

@@ -15,15 +15,15 @@ const PICK = { 14: -1, 15: 1 }; // directional pad, left and right
 const STOP = 1;
 const AXES = [[1, -1], [0, 1], [3, -1]]; // index and sign: left stick up and right, right stick up
 
-/** Whether keys are typed into an element. All others leave the keys that move to the instrument. */
+/** Whether keys are typed into an element. With the lease all others leave the keys that move to the instrument. */
 export const isText = (element) => element instanceof Element && element.matches("input:not([type]), textarea");
 const bounded = (value) => (Number.isFinite(value) ? Math.max(-1, Math.min(1, value)) : 1);
 const isKnown = (pad) => pad.mapping === "standard";
 
 /** Sends the input for `count` axes, or the pixel of `pointing`; `getCommand` returns the fields of a command, or null without the lease. */
 export class Steering {
-  constructor({ count, pointing, getCommand, send, onStop }) {
-    Object.assign(this, { count, pointing, getCommand, send, onStop });
+  constructor({ count, pointing, hasLease, getCommand, send, onStop }) {
+    Object.assign(this, { count, pointing, hasLease, getCommand, send, onStop });
     this.pressed = new Map(); // key or button -> axis and sign
     this.picked = PICKED;
     this.device = "keyboard";
@@ -47,7 +47,7 @@ export class Steering {
     if (isText(event.target) || event.ctrlKey || event.altKey || event.metaKey) return;
     const digit = /^(?:Digit|Numpad)([1-9])$/.exec(event.code);
     if (digit) this.pick(Number(digit[1]) - 1);
-    if (!(event.code in KEYS)) return;
+    if (!(event.code in KEYS) || !this.hasLease()) return; // as in a recording: there keys move the timeline
     event.preventDefault();
     const [slot, sign] = KEYS[event.code];
     if (!event.repeat) this.#hold(event.code, this.axis(slot), sign);
