@@ -318,7 +318,10 @@ def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_nam
         assert load_config(toml).calibration.robot is None
         return
     assert main(options) == 0
-    assert "kinematics.length was 0.07" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "kinematics.length was 0.07" in printed
+    assert "measurement.delays was not set" in printed
+    assert "actuators.names was not set" in printed
     found = load_config(toml)
     # The rig is made with the configuration: its section is 0.07 m long.
     std = found.calibration.robot.std["kinematics.length"]
@@ -366,6 +369,18 @@ def test_gains_signs_and_zeros_are_right_after_one_calibration(
         std = again["std"][f"actuators.offsets[{k}]"] / share
         assert again["fit"][f"dof.{dof}.zero"] == pytest.approx(0.0, abs=3 * std)
         assert 0 < std < 0.01
+
+
+def test_a_wrong_parameter_to_keep_is_refused_before_anything_moves(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = RIG.replace("def reset(self):", "def reset(self):\n        raise SystemError")
+    (folder / "rig_that_moves.py").write_text(text, encoding="utf-8")
+    options = ["--config", "robot.toml", "--rig", "rig_that_moves:Catheter", "--yes"]
+    assert main(["calibrate", "robot", *options, "--keep", "kinematics.lenght"]) == 2
+    assert "--keep: got 'kinematics.lenght', expected dof.bend_x.zero" in capsys.readouterr().err
+    with pytest.raises(SystemError):
+        main(["calibrate", "robot", *options, "--keep", "kinematics.length"])
 
 
 def test_nothing_moves_without_an_answer(

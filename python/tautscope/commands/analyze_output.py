@@ -119,6 +119,8 @@ def _cleaning(analysis: Analysis) -> str:
     }
     notes = [f"{what}: {number}" for what, number in counts.items() if number]
     scored = f"{len(record.rows)} samples, {analysis.scored.sum()} of them scored"
-    if record.time is None:
+    if cleaning.equal_times:
+        notes.append("delay in samples: all times are equal")
+    elif record.time is None:
         notes.append("delay in samples; order and duplicates not checked without --time")
     return "; ".join([scored, *notes]) + "."
