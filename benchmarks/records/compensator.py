@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from records import continuum, tools
 from tautscope.analysis.compensation import as_played, plant, run
-from tautscope.analysis.compensator import compensator
+from tautscope.analysis.compensator import compensator, scale_of
 from tautscope.analysis.verdict import judge
 from tautscope.runs.records import Cleaning, Record
 
@@ -42,9 +42,10 @@ def evaluate(name: str) -> list[Reduction]:
     found = []
     for own, other in ((first, second), (second, first)):
         used = whole if own.compensation is None else own
-        settings = compensator({"tip": as_played(used.record, used.found)})
+        own_motion = as_played(used.record, used.found)
+        settings, scale = compensator({"tip": own_motion}), scale_of(*own_motion)
         played, _ = as_played(other.record, other.found)
-        reached = run(settings, played, *plant(other.record, other.found))
+        reached = run(settings, played, *plant(other.record, other.found), scale=scale)
         assert used.compensation is not None
         said = 1 - used.compensation.after / used.compensation.before
         label = "all" if used is whole else "first half" if own is first else "second half"

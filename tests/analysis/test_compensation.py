@@ -9,7 +9,15 @@ from matplotlib.text import Annotation
 from records.simulated import simulate
 from tautscope.analysis.compensation import as_played, plant, run
 from tautscope.analysis.compensation import simulate as simulate_loop
-from tautscope.analysis.compensator import Parts, compensator, notes, sensors_of, shared_delays
+from tautscope.analysis.compensator import (
+    MOST_DELAY,
+    Parts,
+    compensator,
+    notes,
+    scale_of,
+    sensors_of,
+    shared_delays,
+)
 from tautscope.analysis.identification import Interval
 from tautscope.analysis.models.constant_play import operator
 from tautscope.analysis.slide import slide
@@ -31,9 +39,10 @@ def test_the_loop_does_on_the_other_half_what_the_verdict_says(tool_folder: Path
     )
     assert second.compensation is not None
     said = 1 - second.compensation.after / second.compensation.before
-    settings = compensator({"tip": as_played(second.record, second.found)})
+    motion = as_played(second.record, second.found)
+    settings, scale = compensator({"tip": motion}), scale_of(*motion)
     played, _ = as_played(first.record, first.found)
-    reached = run(settings, played, *plant(first.record, first.found))
+    reached = run(settings, played, *plant(first.record, first.found), scale=scale)
     assert 0.5 < said < 1
     assert 1 - reached.after / reached.before == pytest.approx(said, abs=0.1)
 
@@ -128,6 +137,54 @@ def test_a_loop_of_a_tip_that_is_very_late_can_be_loaded() -> None:
     config = from_document(compensator({"tip": (slow, late)}))
     assert config.measurement.delays[0] == pytest.approx(1.65, rel=0.02)
     assert config.safety.frame_age == config.control.history
+
+
+def sine(duration: float, interval: float, period: float, late: float, size: float = 10) -> Record:
+    """A play with a slack of a fifth of the amplitude, whose tip is late [s]."""
+    time = np.arange(0, duration, interval)
+    command = size * np.sin(2 * np.pi * time / period)
+    tip = np.interp(time - late, time, operator(command, 0.1 * size, 0.0))
+    tip += np.random.default_rng(0).normal(0, 1e-3 * size, len(time))
+    return Record(command, tip, time, np.arange(len(time)), Cleaning())
+
+
+@pytest.mark.parametrize(("duration", "period"), [(90, 15), (240, 20)])
+def test_a_loop_of_a_tip_that_is_later_than_the_usual_history_can_be_loaded(
+    duration: float, period: float
+) -> None:
+    verdict = judge(sine(duration, 0.1, period, late=3.0))
+    assert verdict.helps
+    config = from_document(compensator({"tip": (verdict.record, verdict.found)}))
+    assert config.measurement.delays[0] == pytest.approx(3.0, rel=0.01)
+    assert config.measurement.delays[0] < config.safety.frame_age <= config.control.history
+
+
+def test_a_tip_that_is_too_late_for_the_loop_gets_no_settings() -> None:
+    """Unless the record has no time: its clock is then any."""
+    late = sine(600, 2.0, 60, late=6.0)
+    verdict = judge(late)
+    assert verdict.found.is_identified
+    assert (verdict.settings, verdict.compensation) == (None, None)
+    assert f"it is 6 s late, and the loop can use {MOST_DELAY:.3g} s" in verdict.text
+    assert "Next: subtract 6 s from the tip's time stamps." in verdict.text
+    assert together([judged("play", 3), replace(verdict, name="late")])[1].settings is None
+    untimed = judge(replace(sine(900, 0.1, 150, late=30.0), time=None))
+    assert untimed.found.delay.value > MOST_DELAY / 0.02
+    assert untimed.compensation is not None
+
+
+def test_a_record_that_is_faster_than_a_loop_of_metres_has_a_loop() -> None:
+    """As of a piezo, or with a time in s under a title in ms."""
+    for unit in ("", "mm"):
+        record = replace(sine(0.6, 0.25e-3, 0.01, late=0.0, size=40), units=("", unit))
+        verdict = judge(record)
+        assert verdict.found.is_identified
+        (dof,) = from_document(compensator({"tip": (verdict.record, verdict.found)})).dof
+        assert (dof.speed == 10.0) == bool(unit)
+        assert ("the loop follows 10: check the units of time and tip" in verdict.text) == bool(
+            unit
+        )
+        assert "a stroke takes 0.005 s, and the loop has a command every 0.005 s" in verdict.text
 
 
 def late_parts(*delays: float) -> Parts:

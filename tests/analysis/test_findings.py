@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from tautscope.analysis.findings import Finding, without_errors
 from tautscope.analysis.identification import identify
 from tautscope.analysis.verdict import Verdict, judge
+from tautscope.runs.records import Cleaning, Record
 
 SEEDS = range(2)
 
@@ -86,6 +87,23 @@ def test_counters_and_angles_of_each_range_are_unwrapped(period: float, low: flo
     cleaned, [finding] = without_errors(replace(record, command=(signal - low) % period + low))
     assert f"command: wraps at a range of {period:.6g}" in str(finding)
     np.testing.assert_allclose(np.diff(cleaned.command), np.diff(signal), atol=1e-9 * period)
+
+
+@pytest.mark.parametrize(
+    ("turn", "levels"),
+    [(turn, [0, 1]) for turn in (360.0, 256.0, 2 * np.pi)]
+    + [(360.0, [0, 1, 0, 0.5]), (360.0, [0.002, 0.999])],
+)
+def test_steps_by_a_whole_turn_are_no_wraps(turn: float, levels: list[float]) -> None:
+    """The command rests between them; in the last of these the encoder has noise."""
+    time = 0.1 * np.arange(1200)
+    command = turn * np.array(levels)[(time // 5).astype(int) % len(levels)]
+    if levels[0]:
+        command += np.random.default_rng(0).uniform(-1e-3, 1e-3, len(time)) * turn
+    record = Record(command, np.roll(command, 5), time, np.arange(len(time)), Cleaning())
+    cleaned, findings = without_errors(record)
+    assert findings == []
+    np.testing.assert_array_equal(cleaned.command, command)
 
 
 RISE = np.linspace(0, 1, 1500)

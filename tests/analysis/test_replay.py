@@ -156,6 +156,10 @@ def test_without_time_the_order_is_kept(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.command, [1, 1, 2])
     assert found.time is None
     assert found.cleaning == replay.Cleaning()
+    file.write_text("t,c,m\n1,1,1\n1,1,2\n1,2,2\n")
+    found = replay.read_record(file, "c", "m", "t")
+    assert found.time is None
+    assert found.cleaning == replay.Cleaning(equal_times=True)
 
 
 @pytest.mark.parametrize(

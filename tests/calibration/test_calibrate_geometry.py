@@ -117,6 +117,24 @@ def test_bad_sources_are_named(capsys: Capture, arguments: list[str], message: s
     assert message in failed(capsys, "calibrate", "geometry", *arguments)
 
 
+def test_a_distance_in_metres_is_refused_before_anything_moves(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.setattr(geometry, "sweep", lambda *_, **__: pytest.fail("it moved"))
+    found = failed(capsys, "calibrate", "geometry", "--twin", "--band-distance", "0.005")
+    assert "--band-distance: got 0.005, expected a distance in mm, above" in found
+
+
+@pytest.mark.parametrize("kind", ["geometry", "colour"])
+def test_motors_of_a_video_have_units(capsys: Capture, tmp_path: Path, kind: str) -> None:
+    motors, video = tmp_path / "motors.csv", tmp_path / "none.avi"
+    lines = [f"{k},{100 + k},0,0\n" for k in range(3)]
+    motors.write_text("".join(["time,insertion,rotation,bending\n", *lines]), encoding="utf-8")
+    options = ["calibrate", kind, str(video), "--motors", str(motors)]
+    assert "type --units insertion=mm" in failed(capsys, *options)
+    assert "none.avi" in failed(capsys, *options, "--units", "insertion=mm")
+
+
 def test_figure_and_overlay_show_the_bands(tmp_path: Path) -> None:
     recording, _ = simulate()
     found = fit(recording, told())

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from boards import BOARD, CONFIG, SIZE, rendered
+from tautscope.calibration.camera import coverage
 from tautscope.calibration.camera.board import MODULES
 from tautscope.calibration.camera.coverage import LEAST_VIEWS, Coverage, ViewCollector
 from tautscope.errors import CalibrationError
@@ -92,3 +93,20 @@ def test_a_stream_gives_views_at_rest_that_differ() -> None:
     taken = [views.offer(image) for image in (first, first, first, second, third, third)]
     assert taken == [False, True, False, False, False, True]
     assert views.rejected == {"with the board in motion": 3, "like others": 1}
+
+
+def test_a_stream_with_enough_views_still_gives_those_that_are_lacking(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(coverage, "MOST_VIEWS", 1)
+    views, scene = collector(is_stream=True), camera()
+    for turn, share, is_taken in (
+        ((0.0, 0.0, 0.0), 0.5, True),
+        ((0.0, 0.0, 0.0), 0.4, False),
+        ((0.0, 0.5, 0.0), 0.7, True),
+        ((0.0, 0.5, 0.0), 0.3, True),
+    ):
+        image = posed(scene, turn, share)
+        views.offer(image)
+        assert views.offer(image) == is_taken, (turn, share)
+    assert views.rejected["beyond the number needed"] == 2

@@ -244,6 +244,10 @@ def test_demo_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_pat
             ["analyze", "a.csv", "--command", "c", "--measured", "m", "--gain", "0"],
             "got '0', expected a number other than 0",
         ),
+        (
+            ["analyze", "a.csv", "--command", "c", "--measured", "m", "--gain", "1e160"],
+            "got '1e160', expected a number other than 0, of a magnitude of 1e-100 to 1e100",
+        ),
         (["fly"], "invalid choice: 'fly'"),
         ([], "COMMAND"),
     ],

@@ -313,6 +313,10 @@ def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_
     assert "command: got '1 throughout the first half'" in failed(capsys, *arguments, "m", *out)
     file.write_text("c,m\n" + "".join(f"{c},7\n" for c in range(9)))
     assert "measured: got '7 throughout the first half'" in failed(capsys, *arguments, "m", *out)
+    # Of five samples of a sine none of the first half tells a gain.
+    file.write_text("c,m\n0,0.02\n0.21,-0.01\n0.42,0.01\n0.63,0.002\n0.84,-0.01\n")
+    found = failed(capsys, *arguments, "m", *out)
+    assert "measured: got 'a tip that does not follow the command in the first half'" in found
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
 
 

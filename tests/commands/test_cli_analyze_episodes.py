@@ -11,8 +11,11 @@ import pytest
 from records.lerobot import COLUMNS, MOTORS, TIP, WIDTHS, episode, write
 from refused import failed
 from tautscope.analysis import episodes as of_episodes
+from tautscope.analysis.verdict import Verdict
 from tautscope.cli import main
+from tautscope.errors import ConfigError
 from tautscope.runs.episodes import list_episodes, open_episode
+from tautscope.runs.records import Record
 
 FRAMES, EPISODES = 900, 3
 ALL = (
@@ -60,6 +63,22 @@ def test_the_slack_of_all_degrees_of_freedom(
     known = rows.filter(pl.col("identified"))
     assert (known["width_low"] < known["width"]).all()
     assert (tmp_path / "out" / "episodes.png").stat().st_size > 1000
+
+
+def test_an_episode_that_cannot_be_judged_does_not_end_the_others(
+    data_set: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the error, it is in the row."""
+
+    def refuse(record: Record, columns: tuple[str, str]) -> Verdict:
+        raise ConfigError("dof[0].speed", 49.8, "at most 10 m/s")
+
+    monkeypatch.setattr(of_episodes, "judge", refuse)
+    (found,) = list_episodes(data_set)[:1]
+    pairs = {"tip": (COLUMNS[1], COLUMNS[3])}
+    (row,) = of_episodes.judge_episode(str(data_set), pairs, None, (), found)
+    assert not row["identified"]
+    assert "dof[0].speed: got 49.8" in row["missing"]
 
 
 def test_workers_do_not_change_the_result(

@@ -5,6 +5,7 @@ import io
 import logging
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -15,6 +16,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from common.paths import ROOT
 from refused import failed
@@ -89,6 +92,9 @@ def test_the_help_of_each_command_that_takes_a_rig_says_that_it_moves() -> None:
         ("calibrate colour --twin --video-start 3", "--video-start"),
         ("calibrate geometry log.mcap --seed 3", "--seed"),
         ("calibrate geometry log.mcap --video-start 3", "--video-start"),
+        ("calibrate geometry log.mcap --units time=ms", "--units"),
+        ("calibrate colour a.png --page new --units time=ms", "--units"),
+        ("doctor --yes", "--yes"),
         ("calibrate latency log.mcap --twin", "--twin"),
         ("calibrate latency log.mcap --log new", "--log"),
         ("calibrate latency log.mcap --seconds 20", "--seconds"),
@@ -115,6 +121,23 @@ def test_an_option_without_an_effect_is_refused(
     Path("rig.toml").write_text("")
     assert failed(capsys, *words.split()).startswith(f"error: {option}: got ")
     assert not Path("new").exists()
+
+
+@pytest.mark.parametrize(
+    "words", ["calibrate colour a.png --page new", "calibrate camera --board new"]
+)
+def test_a_file_that_the_disk_has_no_room_for_is_not_left(
+    words: str, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    cv2.imwrite("a.png", np.random.default_rng(0).integers(0, 255, (60, 80, 3), np.uint8))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, limits[1]))
+    try:
+        assert "error: out: got 'new'" in failed(capsys, *words.split())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
 def test_options_have_one_meaning() -> None:

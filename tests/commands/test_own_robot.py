@@ -4,22 +4,25 @@ import io
 import json
 from argparse import Namespace
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
-from tautscope import figure_style
+from tautscope import PlayRig, figure_style
 from tautscope.cli import main
 from tautscope.commands.rig_choice import choose_rig
 from tautscope.config import load_config
 from tautscope.errors import CalibrationError, ConfigError
 from tautscope.hardware import jog
 from tautscope.hardware.doctor import rig as rig_checks
+from tautscope.log.writer import LogWriter
 from tautscope.loop.kinematics import TwoPlanes
 from tautscope.runs.recording import Recording
 
 RIG = """
 import numpy as np
 from tautscope import Pose, Sample
+from tautscope.log.writer import LogWriter
 from tautscope.loop.kinematics import TwoPlanes
 
 class Catheter:
@@ -122,6 +125,43 @@ def test_a_rig_that_fails_leaves_what_it_did(
     with pytest.raises(AssertionError):
         run("--rig", "dead_rig:Catheter", "--out", "none")
     assert not (folder / "none").exists()
+
+
+def test_the_motors_of_a_rig_that_fails_do_not_wait_for_the_log(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing = RIG.replace("        pose =", "        assert time < 0.5\n        pose =")
+    text = failing.replace("        pass\n", "        print('rig closed')\n")
+    (folder / "failing_motors.py").write_text(text, encoding="utf-8")
+    closed: list[str] = []
+    close = LogWriter.close
+    monkeypatch.setattr("builtins.print", lambda *words, **_: closed.extend(map(str, words)))
+    monkeypatch.setattr(LogWriter, "close", lambda log: [close(log), closed.append("log")][0])
+    with pytest.raises(AssertionError):
+        run("--rig", "failing_motors:Catheter", "--seconds", "3", "--out", "out")
+    assert [each for each in closed if each in {"rig closed", "log"}] == ["rig closed", "log"]
+
+
+def test_a_slow_disk_does_not_stop_the_steps_of_a_rig(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    keys = {"queue_events": 50, "sync_period": 0.001}
+    recording = "".join(f"recording.{key} = {value}\n" for key, value in keys.items())
+    unusual = f"safety.unusual = {[f'recording.{key}' for key in keys]}\n"
+    (folder / "robot.toml").write_text(recording + unusual + ROBOT, encoding="utf-8")
+    done, in_time = Event(), []
+
+    def ended(rig: PlayRig) -> None:
+        done.set()
+
+    def sync(file: int) -> None:  # the disk answers when the motors are at rest again
+        in_time.append(done.wait(10))
+
+    monkeypatch.setattr(PlayRig, "close", ended)
+    monkeypatch.setattr("os.fsync", sync)
+    assert run("--rig", "tautscope:PlayRig", "--seconds", "2", "--out", "out") == 0
+    assert all(in_time)
+    assert "ticks or images are dropped" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -278,7 +318,10 @@ def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_nam
         assert load_config(toml).calibration.robot is None
         return
     assert main(options) == 0
-    assert "kinematics.length was 0.07" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "kinematics.length was 0.07" in printed
+    assert "measurement.delays was not set" in printed
+    assert "actuators.names was not set" in printed
     found = load_config(toml)
     # The rig is made with the configuration: its section is 0.07 m long.
     std = found.calibration.robot.std["kinematics.length"]
@@ -326,6 +369,18 @@ def test_gains_signs_and_zeros_are_right_after_one_calibration(
         std = again["std"][f"actuators.offsets[{k}]"] / share
         assert again["fit"][f"dof.{dof}.zero"] == pytest.approx(0.0, abs=3 * std)
         assert 0 < std < 0.01
+
+
+def test_a_wrong_parameter_to_keep_is_refused_before_anything_moves(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = RIG.replace("def reset(self):", "def reset(self):\n        raise SystemError")
+    (folder / "rig_that_moves.py").write_text(text, encoding="utf-8")
+    options = ["--config", "robot.toml", "--rig", "rig_that_moves:Catheter", "--yes"]
+    assert main(["calibrate", "robot", *options, "--keep", "kinematics.lenght"]) == 2
+    assert "--keep: got 'kinematics.lenght', expected dof.bend_x.zero" in capsys.readouterr().err
+    with pytest.raises(SystemError):
+        main(["calibrate", "robot", *options, "--keep", "kinematics.length"])
 
 
 def test_nothing_moves_without_an_answer(

@@ -101,7 +101,10 @@ def test_replay_counts_identical_outputs(
         f"{ticks} of {ticks} commands and {frames} of {frames} updates identical, bit for bit.\n"
     )
     assert main(["replay", str(truncated), "--json", "--out", str(tmp_path / "out")]) == 0
-    found = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert "warning: the log is damaged" in printed.err
+    assert found["damage"]["lost_bytes"] + found["damage"]["bad_chunks"] > 0
     assert found["identical"] is True
     assert 0 < found["same_ticks"] == found["ticks"] < ticks
     assert "replay.png" in {file.name for file in (tmp_path / "out").iterdir()}
@@ -127,7 +130,10 @@ def test_replay_with_another_configuration_shows_its_estimates(
     other.write_text(dump_config(slow))
     arguments = ["replay", str(path), "--config", str(other), "--out"]
     assert main([*arguments, str(tmp_path / "a"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["dof"]["insertion"]
+    document = json.loads(capsys.readouterr().out)
+    assert (document["skipped"], document["warnings"]) == (0, [])
+    assert document["damage"] == {"lost_bytes": 0, "bad_chunks": 0}
+    found = document["dof"]["insertion"]
     width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
     assert found["recorded"]["width"] == pytest.approx(width[-1])
     assert found["replayed"]["width"] < 0.5 * width[-1]

@@ -12,6 +12,7 @@ import numpy as np
 from tautscope.analysis.compensator import (
     GAP,
     LONGEST_GAP,
+    MOST_DELAY,
     MOST_SPEED,
     Parts,
     compensator,
@@ -86,11 +87,13 @@ def simulate(parts: Parts, name: str) -> Compensation:
     """Run the `compensator` of some records on plays that are fitted to one of them."""
     record, found = parts[name]
     played, late = as_played(record, found)
-    settings = compensator({name: (played, late)})
+    settings, scale = compensator({name: (played, late)}), scale_of(played, late)
     if record.is_timed:
         rate = float(np.ptp(record.clock[_fastest(record, found)]) / np.ptp(played.clock))
         settings = _alone(compensator(parts), list(parts).index(name), sensors_of(parts)[0], rate)
-    return run(settings, played, *plant(record, found), max(late_by(played, late), 0.0))
+        scale = scale_of(record, found)
+    delay = max(late_by(played, late), 0.0)
+    return run(settings, played, *plant(record, found), delay, scale=scale)
 
 
 def _alone(
@@ -102,7 +105,7 @@ def _alone(
     if "delays" in measurement:
         measurement["delays"] = [measurement["delays"][sensors[index]] / rate]
     return document | {
-        "dof": [dof | {"speed": min(dof["speed"] * rate, MOST_SPEED)}],
+        "dof": [dof | {"speed": min(dof["speed"] * rate, MOST_SPEED[dof["unit"]])}],
         "measurement": measurement,
         "actuators": {
             "matrix": [[motors["matrix"][index][index]]],
@@ -135,11 +138,13 @@ def as_played(record: Record, found: Identification) -> tuple[Record, Identifica
     """A record with a time from 0 to at most `LONGEST`, and its delay and strokes in this time.
 
     Of a longer record it is the part whose strokes are the fastest. A loop does worse on a motion
-    that is played faster than it is.
+    that is played faster than it is. Without a time the delay is at most `MOST_DELAY`, too.
     """
     clock = record.clock * (1.0 if record.is_timed else UNTIMED)
     kept = _fastest(record, found)
     speed = max(1.0, float(np.ptp(clock[kept])) / LONGEST)
+    if not record.is_timed:
+        speed = max(speed, UNTIMED * found.delay.value / MOST_DELAY)
     time = (clock[kept] - clock[kept][0]) / speed
     scale = (1.0 if record.is_timed else UNTIMED) / speed
     delay = Interval(*(scale * each for each in vars(found.delay).values()))
@@ -181,8 +186,12 @@ def run(
     plays: PrandtlIshlinskii,
     noise: float,
     delay: float | None = None,
+    *,
+    scale: float,
 ) -> Compensation:
     """Run a `compensator` of one degree of freedom on plays, with a record's motion as reference.
+
+    Metres or radians per unit of the tip are those of the settings (`scale_of`).
 
     The tip is measured as often as in the record, with noise, and arrives late by a delay [s], by
     default that of the settings, with a time stamp that is as late. The delay belongs to the
@@ -190,7 +199,7 @@ def run(
     """
     config = from_document(settings)
     actuators, loop = Actuators(config), HysteresisReduction(config)
-    time, scale = record.clock, scale_of(record)
+    time = record.clock
     ticks = np.arange(0, time[-1], PERIOD)
     motors = np.interp(ticks, time, ramped(record))
     reference = np.array([actuators.dofs([each]) for each in motors.tolist()])

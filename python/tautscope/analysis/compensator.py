@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from tautscope._core import MOST_RANGE, MOST_SENSORS
 from tautscope.analysis.identification import Identification
 from tautscope.analysis.setpoints import ramped
 from tautscope.config import Config
+from tautscope.config.control import MOST_TICKS
 from tautscope.config.fields import MOST_RATIO
 from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
@@ -21,8 +22,12 @@ MARGIN, HASTE = 1.5, 2.0
 that is followed over that of the record."""
 WINDOW, MOST_WINDOWS = 1 / 8, 100_000
 """Of a median stroke, over which a speed is measured; and how often."""
-MOST_SPEED = 1000.0
+MOST_SPEED = {"m": 10.0, "rad": 1000.0}
 """That a configuration may have [m/s or rad/s]."""
+MOST_AGE = MOST_TICKS * Config().control.period
+"""Of a measurement that the loop can use [s]: the longest history of its command."""
+MOST_DELAY = MOST_AGE - Config().safety.frame_age
+"""Of a tip that may be as old as usual beside it [s]."""
 CHANGE_RATE = 0.1
 """Of the law: its default is for images, of which some are wrong; a record has a sensor."""
 GAP, LONGEST_GAP = 3.0, 5.0
@@ -58,15 +63,21 @@ for compensate in (False, True):
 '''
 
 
-def scale_of(record: Record) -> float:
-    """Metres or radians per unit of a tip."""
+def scale_of(record: Record, found: Identification) -> float:
+    """Metres or radians per unit of a tip; with a unit that has no name, no loop is too slow."""
     unit = record.units[1]
     kind = "m" if unit in LENGTHS else "rad" if unit in ANGLES else ""
     scale = LENGTHS.get(unit) or ANGLES.get(unit) or UNNAMED
     extent = float(np.nanmax(record.measured) - np.nanmin(record.measured))
-    while scale * extent > _LARGEST[kind]:
+    speed = HASTE * abs(found.gain) * speed_of(record, found) if record.is_timed else 0.0
+    while scale * extent > _LARGEST[kind] or (not kind and scale * speed > MOST_SPEED["m"]):
         scale *= UNNAMED
     return scale
+
+
+def loop_unit(record: Record) -> Literal["m", "rad"]:
+    """The unit that the loop has for a tip."""
+    return "rad" if record.units[1] in ANGLES else "m"
 
 
 def tip_interval(record: Record) -> float:
@@ -78,6 +89,11 @@ def late_by(record: Record, found: Identification) -> float:
     """Delay, if it differs from 0 by more than chance and half a sample, else 0."""
     delay = found.delay.value
     return delay if abs(delay) > _doubt(record, found) else 0.0
+
+
+def is_too_late(record: Record, found: Identification) -> bool:
+    """Whether the loop cannot use a tip, since its history of commands is too short."""
+    return record.is_timed and late_by(record, found) > MOST_DELAY
 
 
 def speed_of(record: Record, found: Identification) -> float:
@@ -148,13 +164,13 @@ def compensator(parts: Parts) -> dict[str, Any]:
 
     The loop's unit is m or rad, with the tip's zero; its command is a tip in the middle of the
     slack, and [actuators] turns it into the record's motors. Speeds and delays are those of the
-    record's time, and left out if it has none.
+    record's time, and left out if it has none. No tip may be later than `is_too_late`.
     """
     usual, dofs, noises = Config(), [], []
     gap = usual.safety.frame_gap
     gains, offsets, units = [], [], []
     for name, (record, found) in parts.items():
-        scale = scale_of(record)
+        scale = scale_of(record, found)
         width = scale * found.width.value
         path = scale * (found.gain * record.command + found.offset)
         limit = MARGIN * width
@@ -162,14 +178,14 @@ def compensator(parts: Parts) -> dict[str, Any]:
         limit = max(limit, (high - low) / MOST_RANGE)
         dof = {
             "name": name,
-            "unit": "rad" if record.units[1] in ANGLES else "m",
+            "unit": loop_unit(record),
             "width_limit": limit,
             "expected_width": width,
             "range": [low, high],
         }
         if record.is_timed:
             speed = abs(scale * found.gain) * speed_of(record, found)
-            dof["speed"] = min(HASTE * speed + limit / 10, MOST_SPEED)
+            dof["speed"] = min(HASTE * speed + limit / 10, MOST_SPEED[loop_unit(record)])
             gap = max(gap, min(GAP * tip_interval(record), LONGEST_GAP))
         dofs.append(dof)
         noises.append(scale * found.noise / limit)
@@ -187,8 +203,10 @@ def compensator(parts: Parts) -> dict[str, Any]:
     _, delays = sensors_of(parts)
     if delays:
         document["measurement"]["delays"] = delays
-        age = max(usual.safety.frame_age, 1.5 * max(delays))
-        safety["frame_age"] = min(age, usual.control.history)
+        age = min(max(usual.safety.frame_age, 1.5 * max(delays)), MOST_AGE)
+        safety["frame_age"] = age
+        if age > usual.control.history:
+            document["control"] = {"history": age}
     if safety:
         document["safety"] = safety
     return {name: _rounded(section) for name, section in document.items()}
@@ -205,11 +223,11 @@ def notes(parts: Parts) -> list[str]:
     if len(untimed) < len(parts):
         what = f"speed: {HASTE:g} times that of the record; a faster reference is held to it."
         found.append(what)
-    for name, (record, _) in parts.items():
-        unit, scale = record.units[1], scale_of(record)
+    for name, (record, identified) in parts.items():
+        unit, scale = record.units[1], scale_of(record, identified)
         if scale != (LENGTHS.get(unit) or ANGLES.get(unit)):
             what = "the file names no plausible length or angle as the tip's unit"
-            found.append(f"{what}: {scale:g} {'rad' if unit in ANGLES else 'm'} is 1 of {name}")
+            found.append(f"{what}: {scale:g} {loop_unit(record)} is 1 of {name}")
     if untimed:
         found.append("The record has no time: set speed, and measurement.delays in s.")
     late = {name: late_by(*part) for name, part in parts.items() if part[0].is_timed}

@@ -13,7 +13,7 @@ import numpy as np
 
 from tautscope.analysis.models.task import Floats
 from tautscope.analysis.verdict import Verdict, judge
-from tautscope.errors import RecordError
+from tautscope.errors import TautscopeError
 from tautscope.runs.columns import time_column
 from tautscope.runs.episodes import Episode, open_episode
 from tautscope.runs.records import read_record
@@ -80,7 +80,7 @@ def judge_episode(
             at = time or time_column(sheet.titles)
             record = read_record(sheet, command, tip, at, missing=missing)
             row |= _row(judge(record, columns=(command, tip)))
-        except RecordError as error:
+        except TautscopeError as error:
             row |= {"identified": False, "aligned": False, "missing": str(error)}
         rows.append(row)
     return rows

@@ -16,6 +16,8 @@ Mask = NDArray[np.bool_]
 
 WRAPS = (2 * np.pi, 360.0, *(2.0**bits for bits in (8, 10, 12, 13, 14, 15, 16, 20, 24, 32)))
 """Ranges after which counters and angles begin again."""
+STILL = 0.05
+"""Motion of an unwrapped signal, over the range of its counter, below which it did not wrap."""
 FAR = 3.0
 """A value that is farther from the others than this many of their ranges was not measured."""
 LONE = 4
@@ -231,8 +233,18 @@ def _unwrapped(values: Floats) -> tuple[Floats, float, NDArray[np.intp]]:
         if np.all(np.abs(period - sizes[is_wrap]) <= 3 * max(usual, largest)):
             unwrapped = values.copy()
             unwrapped[seen] = np.unwrap(values[seen], period=period)
-            return unwrapped, period, seen[1:][is_wrap]
+            if not _rests(unwrapped[seen], period, np.flatnonzero(is_wrap)):
+                return unwrapped, period, seen[1:][is_wrap]
     return none
+
+
+def _rests(unwrapped: Floats, period: float, at: NDArray[np.intp]) -> bool:
+    """Whether what looked like wraps at steps was all of the motion: steps by a whole turn."""
+    if np.ptp(unwrapped) < STILL * period:
+        return True
+    steps = np.abs(np.diff(unwrapped))
+    around = np.clip(at[:, None] + [-1, 0, 1], 0, len(steps) - 1)
+    return bool(np.median(steps[around].max(axis=1)) <= 1e-12 * period)
 
 
 def _far(values: Floats) -> Mask:

@@ -1,7 +1,7 @@
 """The answer to a record: slack, how sure, what compensation would do, what to do next."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -9,8 +9,19 @@ import numpy as np
 
 from tautscope._core import MOST_SENSORS
 from tautscope.analysis.comparison import check_motion
-from tautscope.analysis.compensation import Compensation, simulate
-from tautscope.analysis.compensator import Parts, compensator, late_by, shared_delays
+from tautscope.analysis.compensation import PERIOD, Compensation, simulate
+from tautscope.analysis.compensator import (
+    MOST_DELAY,
+    MOST_SPEED,
+    Parts,
+    compensator,
+    is_too_late,
+    late_by,
+    loop_unit,
+    scale_of,
+    shared_delays,
+    speed_of,
+)
 from tautscope.analysis.findings import (
     CURVE,
     Finding,
@@ -26,6 +37,8 @@ from tautscope.runs.records import Record
 
 PARSIMONY = 1.05
 """A simpler explanation is as good if it leaves this factor of the error at most."""
+LEAST_TICKS = 10
+"""Of the loop in a stroke, for what it can follow."""
 ROUNDING = 1e-6
 """Smaller errors, over the extent of the tip, are those of the fit: the record is exact."""
 
@@ -40,8 +53,9 @@ class Verdict:
         record: Without the samples that were not measured.
         found: Slack, delay, gain and drift.
         findings: What is wrong with the record.
-        compensation: What the loop would do; None where nothing is identified.
-        settings: Of the loop, see `compensator`; None where nothing is identified.
+        compensation: What the loop would do; None where there are no settings.
+        settings: Of the loop, see `compensator`; None where nothing is identified, or the tip is
+            too late for the loop.
     """
 
     name: str
@@ -163,8 +177,7 @@ class Verdict:
             return self._use()
         if found.is_aligned:
             if self._is_late:
-                late = f"{found.delay.value:.3g} {self.record.clock_unit}"
-                return f"subtract {late} from the tip's time stamps"
+                return self._shift()
             return "command the motor directly; the error that remains is not slack"
         if found.is_related and any(CURVE in each.what for each in self.findings):
             return (
@@ -178,6 +191,8 @@ class Verdict:
         found = self.found
         if found.is_early:
             return EXCHANGE
+        if self.settings is None:
+            return self._shift()
         if self.helps:
             late = late_by(self.record, found) if self.record.is_timed else 0.0
             stamps = "; its measurement.delays is for time stamps as in the record"
@@ -185,6 +200,10 @@ class Verdict:
         if self.compensation is not None and self.compensation.held:
             return "try compensator.toml with a smooth reference, or record a slower motion"
         return "measure the tip more often, earlier or with less noise, and record again"
+
+    def _shift(self) -> str:
+        late = f"{self.found.delay.value:.3g} {self.record.clock_unit}"
+        return f"subtract {late} from the tip's time stamps"
 
 
 def judge(
@@ -223,15 +242,35 @@ def judge(
                 "--command and --measured swapped, or the motor's time stamps late?"
             )
             findings.append(Finding("tip", what))
-    parts = {name: (record, found)} if found.is_identified else {}
+    is_late = is_too_late(record, found)
+    if found.is_identified:
+        findings += _limits(record, found)
+    parts = {name: (record, found)} if found.is_identified and not is_late else {}
     effect = simulate(parts, name) if parts else None
     settings = compensator(parts) if parts else None
     return Verdict(name, columns, record, found, tuple(findings), effect, settings)
 
 
+def _limits(record: Record, found: Identification) -> Iterator[Finding]:
+    """What of a record is beyond what a loop can have."""
+    if is_too_late(record, found):
+        what = f"it is {late_by(record, found):.3g} s late, and the loop can use {MOST_DELAY:.3g} s"
+        yield Finding("tip", what)
+    if not record.is_timed:
+        return
+    unit = loop_unit(record)
+    speed = scale_of(record, found) * abs(found.gain) * speed_of(record, found)
+    if speed > MOST_SPEED[unit]:
+        most = f"{MOST_SPEED[unit]:g}: check the units of time and tip"
+        yield Finding("tip", f"it moves at {speed:.3g} {unit}/s, and the loop follows {most}")
+    if found.stroke < LEAST_TICKS * PERIOD:
+        every = f"a command every {PERIOD:g} s: check the unit of the time"
+        yield Finding("command", f"a stroke takes {found.stroke:.3g} s, and the loop has {every}")
+
+
 def parts_of(verdicts: Iterable[Verdict]) -> Parts:
-    """What a `compensator` for these verdicts is made from: those whose slack is identified."""
-    return {each.name: (each.record, each.found) for each in verdicts if each.found.is_identified}
+    """What a `compensator` for these verdicts is made from: those that have settings."""
+    return {each.name: (each.record, each.found) for each in verdicts if each.settings is not None}
 
 
 def together(verdicts: Sequence[Verdict]) -> list[Verdict]:

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, positions
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_json, print_warnings
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -66,8 +66,7 @@ def _run(options: argparse.Namespace) -> int:
     print_delay(found)
     if found.is_known:
         print(f"{remedy}.")
-    for note in notes:
-        print(f"Warning: {note}.")
+    print_warnings(notes)
     return 0 if found.is_known else NO_ANSWER
 
 

@@ -66,12 +66,14 @@ def print_results(results: Sequence[tuple[Verdict, Analysis]], folder: Path) -> 
         screen.print(f"{name}{_cleaning(analysis)}", soft_wrap=True)
     screen.print(f"Figures and samples: {folder}", soft_wrap=True)
     known = [verdict.name for verdict, _ in results if verdict.settings is not None]
-    others = [verdict.name for verdict, _ in results if verdict.settings is None]
+    others = [verdict for verdict, _ in results if verdict.settings is None]
     if known:
         file = folder / "compensator.toml"
         screen.print(f"Loop of {', '.join(known)}: {file}; to try it: {file.with_suffix('.py')}")
-    if others:
-        screen.print(f"No settings for {', '.join(others)}: the slack is not identified.")
+    for is_late, why in ((False, "the slack is not identified"), (True, "the tip is too late")):
+        names = [each.name for each in others if each.found.is_identified is is_late]
+        if names:
+            screen.print(f"No settings for {', '.join(names)}: {why}.")
 
 
 def _text(results: Sequence[tuple[Verdict, Analysis]]) -> str:
@@ -117,6 +119,8 @@ def _cleaning(analysis: Analysis) -> str:
     }
     notes = [f"{what}: {number}" for what, number in counts.items() if number]
     scored = f"{len(record.rows)} samples, {analysis.scored.sum()} of them scored"
-    if record.time is None:
+    if cleaning.equal_times:
+        notes.append("delay in samples: all times are equal")
+    elif record.time is None:
         notes.append("delay in samples; order and duplicates not checked without --time")
     return "; ".join([scored, *notes]) + "."

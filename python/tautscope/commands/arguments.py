@@ -13,6 +13,8 @@ from tautscope.errors import ConfigError, FieldError
 from tautscope.runs.output_folder import check_free, default_folder
 
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
+_LARGEST = 1e100
+"""Of numbers, as of the cells of a table."""
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
@@ -167,5 +169,8 @@ def _number(
 
 natural, positive = _integer(0), _integer(1)
 above_zero = _number("a number above 0", lambda value: value > 0)
-not_zero = _number("a number other than 0", lambda value: value != 0)
+not_zero = _number(
+    "a number other than 0, of a magnitude of 1e-100 to 1e100",
+    lambda value: 1 / _LARGEST <= abs(value) <= _LARGEST,
+)
 seconds = _number("a number of seconds")

@@ -85,7 +85,8 @@ def _run(options: argparse.Namespace) -> None:
         of_images = ("model", "seconds", "ros", "twin", "seed", "config", "write", "out")
         arguments.refuse_unused(options, "no --board, which calibrates nothing", *of_images)
         board = Board(options.columns, options.rows, options.square)
-        board.write_pdf(check_free_file(options.board))
+        with new_file(options.board) as partial:
+            board.write_pdf(partial)
         print_json(options, {"file": str(options.board)})
         print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
         return

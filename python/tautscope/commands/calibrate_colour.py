@@ -14,7 +14,7 @@ from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments, calibration_output, calibration_rig, positions
 from tautscope.commands.printing import print_json, progress_bar
 from tautscope.errors import FieldError
-from tautscope.runs.output_folder import check_free_file
+from tautscope.runs.output_folder import new_file
 
 if TYPE_CHECKING:
     from tautscope.calibration.bands.labels import LabelledImage
@@ -109,7 +109,7 @@ def _run(options: argparse.Namespace) -> None:
 
     files: list[Path] = options.files
     if options.page is not None:
-        of_clicks = ("click", "motors", "video_start", "twin", "seed", "yes")
+        of_clicks = ("click", "motors", "units", "video_start", "twin", "seed", "yes")
         only_page = "no --page, which calibrates nothing"
         arguments.refuse_unused(options, only_page, *of_clicks, "config", "write", "out")
         _write_page(options, files)
@@ -133,12 +133,12 @@ def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
     if len(files) != 1:
         raise FieldError("files", len(files), "one image, with --page")
     image = read_image(files[0])
-    check_free_file(options.page)
     _, data = cv2.imencode(".png", image)
     command = shlex.join(["tautscope", "calibrate", "colour", str(files[0])])
     text = _PAGE.replace("COMMAND", escape(command, quote=True))
     text = text.replace("PIXELS", base64.b64encode(data.tobytes()).decode())
-    options.page.write_text(text, encoding="utf-8")
+    with new_file(options.page) as partial:
+        partial.write_text(text, encoding="utf-8")
     print_json(options, {"file": str(options.page)})
     print(f"Open {options.page} in a browser, and click on the bands.")
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from tautscope.calibration.result import CalibrationResult
 from tautscope.commands import arguments, calibration_output, calibration_rig, positions
-from tautscope.commands.printing import print_json, progress_bar
+from tautscope.commands.printing import print_json, print_warnings, progress_bar
 from tautscope.config import Config
-from tautscope.errors import RecordError
+from tautscope.errors import FieldError, RecordError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,17 +68,17 @@ def _run(options: argparse.Namespace) -> int:
     calibration_output.check_options(options)
     serial_numbers: Mapping[str, str] = {}
     if file is None:
+        _band_distance(options, arguments.article_config(options.config))  # before anything moves
         recording, config, serial_numbers = move(options)
     else:
         recorder, config = positions.read_motion(options, file, Recorder)
         recording = recorder.recording()
-    distance = None if options.band_distance is None else options.band_distance * 1e-3
+    distance = _band_distance(options, config)
     found = fit(recording, config, intrinsics=options.intrinsics, band_distance=distance)
     print("\n".join(f"# {line}" for line in table(found)))
     if not found.is_plausible:
         print_json(options, {"is_plausible": False, "warnings": list(found.warnings)})
-        for warning in found.warnings:
-            print(f"warning: {warning}.", file=sys.stderr)
+        print_warnings(found.warnings)
         print("The model does not explain this record. Nothing was written.", file=sys.stderr)
         return 1
     found_result = result(found, serial_numbers, with_figures=options.out is not None)
@@ -88,6 +88,17 @@ def _run(options: argparse.Namespace) -> int:
 
         write_overlay(found, config, options.out / "overlay.avi")
     return 0
+
+
+def _band_distance(options: argparse.Namespace, config: Config) -> float | None:
+    """The distance of ``--band-distance`` [m]."""
+    if options.band_distance is None:
+        return None
+    least = 1e3 * config.instrument.band_length
+    if options.band_distance <= least:
+        allowed = f"a distance in mm, above {least:.3g}, the length of a band"
+        raise FieldError("--band-distance", options.band_distance, allowed)
+    return float(options.band_distance) * 1e-3
 
 
 def move(options: argparse.Namespace) -> tuple[Recording, Config, Mapping[str, str]]:

@@ -144,5 +144,8 @@ def _read(path: Path) -> SessionState | None:
 def _write(path: Path, document: object) -> None:
     """Replace a file in one step."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(document, indent=1), encoding="utf-8")
-    partial.replace(path)
+    try:
+        partial.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)

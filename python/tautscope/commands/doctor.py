@@ -116,6 +116,7 @@ def _check_own(
 
 def _doctor(options: argparse.Namespace) -> int:
     if options.rig is None:
+        arguments.refuse_unused(options, "--rig, which it resets", "yes")
         config = arguments.article_config(options.config)
         checks = run_checks(config, options.config)
     else:

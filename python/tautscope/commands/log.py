@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments, positions
-from tautscope.commands.printing import print_json, progress_bar
+from tautscope.commands.printing import print_json, print_warnings, progress_bar
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 from tautscope.extras import require_extras
@@ -143,10 +143,13 @@ def _beside(file: Path, end: str) -> Path:
 
 
 def _print_damage(options: argparse.Namespace, document: dict[str, Any], damage: Damage) -> None:
-    found = {"lost_bytes": damage.lost_bytes, "bad_chunks": damage.bad_chunks}
-    print_json(options, {**document, "damage": found})
+    print_json(options, {**document, "damage": _damage(damage)})
     if damage:
         print(f"{options.file} is {'truncated' if damage.is_truncated else 'damaged'}: {damage}.")
+
+
+def _damage(damage: Damage) -> dict[str, int]:
+    return {"lost_bytes": damage.lost_bytes, "bad_chunks": damage.bad_chunks}
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -171,7 +174,8 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
         write_replay(options.out, replayed, log.recording())
     folder = None if options.out is None else str(options.out)
     identical = comparison.is_identical
-    print_json(options, {"folder": folder, "identical": identical, **asdict(comparison)})
+    document = {"folder": folder, "identical": identical, **asdict(comparison)}
+    print_json(options, {**document, **_facts(log)})
     print(
         f"{comparison.same_ticks} of {comparison.ticks} commands and "
         f"{comparison.same_updates} of {comparison.updates} updates identical, bit for bit."
@@ -196,9 +200,10 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
         config = load_config(options.config, options.profile)
     folder = arguments.out_folder(options)
     replayed, skipped = estimate_from_log(log, config)
-    write_estimates(options, folder, replayed, log.recording())
+    facts = {**_facts(log), "skipped": skipped}
+    write_estimates(options, folder, replayed, log.recording(), facts)
     if skipped:
-        print(f"{skipped} updates were skipped: their images are not in the log.")
+        print_warnings([f"{skipped} updates were skipped: their images are not in the log"])
     _print_warnings(log)
     return 0
 
@@ -250,8 +255,12 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     return 0
 
 
+def _facts(log: Log) -> dict[str, Any]:
+    """What the object of ``--json`` says of a log."""
+    return {"damage": _damage(log.damage), "warnings": list(log.warnings)}
+
+
 def _print_warnings(log: Log) -> None:
     if log.damage:
-        print("The log is damaged; repair it with `tautscope recover`.")
-    for warning in log.warnings:
-        print(f"Warning in the log: {warning}.")
+        print_warnings(["the log is damaged; repair it with `tautscope recover`"])
+    print_warnings(f"in the log: {warning}" for warning in log.warnings)

@@ -134,10 +134,11 @@ def align_video_options(
 
 
 def add_motor_options(parser: argparse.ArgumentParser) -> None:
-    """``--motors`` and ``--video-start``."""
+    """``--motors``, ``--units`` and ``--video-start``."""
     parser.add_argument(
         "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
     )
+    add_units(parser)
     parser.add_argument(
         "--video-start",
         type=arguments.seconds,
@@ -148,11 +149,11 @@ def add_motor_options(parser: argparse.ArgumentParser) -> None:
 
 
 def check_motor_options(options: argparse.Namespace, file: Path | None) -> None:
-    """Check that ``--motors`` and ``--video-start`` belong to a video; `file` may be a log."""
+    """Check that options of `add_motor_options` belong to a video; `file` may be a log."""
     if file is None or file.suffix == ".mcap":
         arguments.refuse_unused(options, "a video together with --motors", "motors")
     if options.motors is None:
-        arguments.refuse_unused(options, "a video with --motors", "video_start")
+        arguments.refuse_unused(options, "a video with --motors", "video_start", "units")
 
 
 def read_motion(
@@ -168,7 +169,7 @@ def read_motion(
         raise FieldError("file", str(file), allowed)
     config = arguments.article_config(options.config)
     recorder = make(config)
-    times, positions = read_motors(options.motors)
+    times, positions = read_positions(str(options.motors), options.units, config)
     for time, position in zip(times, positions, strict=True):
         recorder.add_tick(float(time), position)
     for frame in read_video(str(file), config.camera, options.video_start):

@@ -26,6 +26,12 @@ def print_json(options: argparse.Namespace, document: dict[str, Any]) -> None:
         print(json.dumps(document, allow_nan=False), file=options.stdout, flush=True)
 
 
+def print_warnings(texts: Iterable[str]) -> None:
+    """Print warnings on stderr, also with ``--json``."""
+    for text in texts:
+        print(f"warning: {text}.", file=sys.stderr)
+
+
 def announce(what: str, seconds: float, size: float, folder: Path) -> None:
     """Print on stderr how long a command takes, and where it writes.
 

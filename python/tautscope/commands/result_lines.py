@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+from tautscope.commands.printing import print_warnings
 from tautscope.dof import NamedDof
 from tautscope.report.operator_motion import OperatorResult
 from tautscope.report.recorded_run import RecordedRun
@@ -19,8 +20,7 @@ def print_results(run: RecordedRun, folder: Path) -> None:
         error = _shown(dof, tracking.uncompensated_rms)
         plain = f"{dof.label}: without compensation tracking error {error} RMS, {run.tip}"
         print(_tracking_line(dof, tracking, run.tip) if run.main.compensated else plain)
-    for warning in run.main.warnings:
-        print(f"Warning: {warning}.")
+    print_warnings(run.main.warnings)
     print(f"Report, figures and traces: {folder / 'report.html'}")
 
 

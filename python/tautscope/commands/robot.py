@@ -59,7 +59,8 @@ def run(
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration
     announce("2 runs", seconds, seconds * bytes_per_second(len(config.dof)), folder)
-    if getattr(options, "rig", None) is not None:
+    is_simulated = getattr(options, "rig", None) is None
+    if not is_simulated:
         confirm_motion(options, "over up to 60 % of each range. Keep", config)
     runs: list[Recording] = []
     with recording_saved(folder), exit_on_signals(), progress_bar("2 runs") as progress:
@@ -69,9 +70,10 @@ def run(
 
         for suffix, compensate in (("_uncompensated", False), ("", True)):
             path = folder / f"{suffix[1:] or 'compensated'}.mcap"
+            # The rig is closed first: its motors do not wait for the disk, in a tick or at the end.
             with (
+                run_log(path, config, compensate=compensate, wait=is_simulated) as log,
                 closing(make_rig(config)) as rig,
-                run_log(path, config, compensate=compensate, wait=True) as log,
             ):
                 runs.append(run_experiment(rig, motion, config, compensate, report, log=log))
             runs[-1].write(folder, suffix)

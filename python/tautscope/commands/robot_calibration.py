@@ -75,11 +75,13 @@ def run_latency(options: argparse.Namespace) -> None:
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
     from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
+    from tautscope.calibration.robot.parameters import check_keep  # noqa: PLC0415
 
     config, make = choose_rig(options)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
     refuse_wrong_limits(options.config)
+    check_keep(config, keep)  # after the motion it would be too late
     sweep = sweep_motion(config, options.seconds or DURATION / 2)
     confirm_motion(options, "over 80 % of each range. Keep", config)
     with closing(make(config)) as rig, progress_bar("sweep") as progress:
@@ -103,8 +105,8 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
     notes = []
     for name in values:
         section, key = name.split(".")
-        before = getattr(getattr(config, section), key, "not there")
-        notes.append(f"{name} was {before}")
+        before = getattr(getattr(config, section), key, None)
+        notes.append(f"{name} was {'not set' if before in (None, ()) else before}")
     for name, each in std.items():
         if name.startswith("measurement.delays") and found.values[name] < -2 * each:
             notes.append(

@@ -7,6 +7,9 @@ from msgspec import Meta
 from tautscope.config.fields import Fraction, Gain, NonNegative, Positive
 from tautscope.config.section import Section, require, require_at_most
 
+MOST_TICKS = 1024
+"""Of the command history."""
+
 
 class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Period and history of the control loop."""
@@ -18,8 +21,9 @@ class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     def _check(self) -> None:
         """The history has 1 to 1024 ticks."""
-        allowed = f"{self.period:g} to {1024 * self.period:g}, 1 to 1024 of control.period"
-        require(1 <= self.history / self.period <= 1024, "history", self.history, allowed)
+        most = MOST_TICKS * self.period
+        allowed = f"{self.period:g} to {most:g}, 1 to {MOST_TICKS} of control.period"
+        require(1 <= self.history / self.period <= MOST_TICKS, "history", self.history, allowed)
 
 
 class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -172,7 +172,10 @@ def read_log(path: str | PathLike[str]) -> Log:
             warnings.append(topics.decode(topic, record.data).msg)
         elif topic in topics.TYPES:
             groups[record.sequence][topic] = record.data
-    header = read_header(groups.pop(0, {}))
+    try:
+        header = read_header(groups.pop(0, {}))
+    except RecordError as error:
+        raise RecordError(error.field, f"{file}: {error.value}", error.allowed) from None
     codec = msg.Codec(header[0])
     events: dict[int, Tick | Update | Request] = {}
     for index, messages in sorted(groups.items()):

@@ -31,8 +31,9 @@ def read_run(
     that are complete; without one it counts as another motion.
 
     Args:
-        path: A log; a folder with ``compensated.mcap`` and perhaps ``uncompensated.mcap``, or with
-            a single log; or a folder of `Recording.save` or `tautscope export`.
+        path: A log, of which ``compensated.mcap`` is as its folder; a folder with
+            ``compensated.mcap`` and perhaps ``uncompensated.mcap``, or with a single log; or a
+            folder of `Recording.save` or `tautscope export`.
         uncompensated: Log or folder of the run without compensation, in place of the one beside it.
 
     Raises:
@@ -56,11 +57,12 @@ def read_run(
 
 def _find(place: Path) -> tuple[Path, Recording, Recording | None]:
     """Where a run was found, the run, and the one without compensation beside it."""
+    folder = place if place.is_dir() else place.parent
+    pair = [folder / f"{name}compensated.mcap" for name in ("", "un")]
+    if place in (folder, pair[0]) and pair[0].is_file():
+        return pair[0], _from_log(pair[0]), _from_log(pair[1]) if pair[1].is_file() else None
     if place.is_dir():
         logs = sorted(place.glob("*.mcap"))
-        pair = [place / f"{name}compensated.mcap" for name in ("", "un")]
-        if pair[0] in logs:
-            return pair[0], _from_log(pair[0]), _from_log(pair[1]) if pair[1] in logs else None
         kinds = [kind for kind in ("", PLAIN) if (place / f"recording{kind}.toml").is_file()]
         if "" in kinds or (kinds and not logs):
             tables = [_from_tables(place, kind) for kind in kinds]

@@ -38,6 +38,7 @@ class Cleaning:
         gaps: Sampling intervals above ten medians. The command is assumed monotonic in a gap; if it
             turned there, every model is wrong until it has reached both contacts again.
         longest_gap: [s], 0 without gaps.
+        equal_times: Whether there was a time, but one alone.
     """
 
     blank: int = 0
@@ -48,6 +49,7 @@ class Cleaning:
     clock_steps: int = 0
     gaps: int = 0
     longest_gap: float = 0.0
+    equal_times: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,6 +281,7 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
     table, rows, time = table[is_known], rows[is_known], time[is_known]
     steps, longest = _steps(time)
     gaps = steps[steps > longest]
+    has_time = bool(time[-1] > time[0])
     cleaning = Cleaning(
         blank=blank + int(np.count_nonzero(~is_known)),
         interpolated=int(np.count_nonzero(is_lone & is_known)),
@@ -288,8 +291,8 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
         clock_steps=clock_steps,
         gaps=len(gaps),
         longest_gap=float(gaps.max()) if len(gaps) else 0.0,
+        equal_times=not has_time,
     )
-    has_time = time[-1] > time[0]
     return Record(table[:, 0], table[:, 1], time if has_time else None, rows, cleaning)
 
 

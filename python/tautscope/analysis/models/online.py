@@ -10,6 +10,7 @@ from tautscope._core import Estimator, TipFilter
 from tautscope.analysis.models import constant_play
 from tautscope.analysis.models.task import Floats, Prediction, Task
 from tautscope.config import Config
+from tautscope.errors import RecordError
 from tautscope.loop.construction import core_settings
 
 UPDATE_SHARE = 0.01
@@ -60,9 +61,15 @@ def input_scale(task: Task) -> InputScale:
 
     If the gain is given, the first measured tip gives the offset. Otherwise both are those of a
     constant play fitted to the first half, which is not scored.
+
+    Raises:
+        RecordError: Its gain is 0.
     """
     if task.gain is None:
         play = constant_play.fit(*task.first_half)
+        if play.gain == 0:
+            found = "a tip that does not follow the command in the first half"
+            raise RecordError("measured", found, "at least four strokes")
         return InputScale(play.gain, -(play.delta_minus + play.delta_plus) / 2, task.half)
     first = int(np.flatnonzero(np.isfinite(task.measured))[0])
     offset = float(task.measured[first] - task.gain * task.command[first])

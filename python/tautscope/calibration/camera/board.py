@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 
 import cv2
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.images import SATURATED, Image
-from tautscope.errors import FieldError, OutputError
+from tautscope.errors import FieldError
 
 MODULES = 8
 """Modules (black or white cells) per side of a square; a marker has 6."""
@@ -96,11 +97,9 @@ class Board:
             "Glue it on a flat plate; matt paper."
         )
         scale.text(page[0] / 2, below - 0.002, text, ha="center", va="top", fontsize=7)
-        try:
-            figure.savefig(path, format="pdf", dpi=figure.dpi)
-        except OSError as error:
-            allowed = f"a file that can be written ({error.strerror})"
-            raise OutputError("board", str(path), allowed) from None
+        data = BytesIO()  # the PDF of a file that cannot be written ends in another error
+        figure.savefig(data, format="pdf", dpi=figure.dpi)
+        path.write_bytes(data.getvalue())
 
     def find(self, grey: Image) -> View | None:
         """Find the board's corners in a grey image; None with fewer than `LEAST_CORNERS`."""

@@ -24,7 +24,7 @@ LEAST_TILT = 0.12
 """A board is tilted if its depth changes by more over its width or height [share]."""
 
 MOST_VIEWS = 60
-"""A stream gives no more views."""
+"""A stream gives no more views, but for those with what is lacking."""
 LARGEST_MOTION = 1.0
 """A view of a stream is used if its corners moved less since the last image on average [px]."""
 LEAST_DIFFERENCE = 0.04
@@ -50,13 +50,26 @@ class Coverage:
 
     def add(self, view: View) -> None:
         """Count a view."""
+        np.add.at(self.corners, self._cells(view), 1)
+        for tilt in self._tilts(view):
+            self.tilts[tilt] += 1
+        self.views += 1
+
+    def is_lacking(self, view: View) -> bool:
+        """Whether a view has corners in a cell, or a tilt, that is lacking."""
+        has_new_tilt = any(self.tilts[tilt] < LEAST_TILTED for tilt in self._tilts(view))
+        return has_new_tilt or not self.covered[self._cells(view)].all()
+
+    def _cells(self, view: View) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows and columns of the cells of a view's corners."""
         cells = np.array([COLUMNS, ROWS])
         columns, rows = np.clip(view.pixels * cells // self.size, 0, cells - 1).astype(int).T
-        np.add.at(self.corners, (rows, columns), 1)
+        return rows, columns
+
+    def _tilts(self, view: View) -> list[str]:
         across, down = _tilt(view, self.board)
-        for tilt, value in zip(_TILTS, (across, -across, down, -down), strict=True):
-            self.tilts[tilt] += value > LEAST_TILT
-        self.views += 1
+        values = zip(_TILTS, (across, -across, down, -down), strict=True)
+        return [tilt for tilt, value in values if value > LEAST_TILT]
 
     @property
     def covered(self) -> NDArray[np.bool_]:
@@ -154,7 +167,7 @@ class ViewCollector:
         return reason
 
     def _reason_in_stream(self, view: View, last: View | None) -> str:
-        if len(self.views) >= MOST_VIEWS:
+        if len(self.views) >= MOST_VIEWS and not self.coverage.is_lacking(view):
             return "beyond the number needed"
         if last is None or _distance(view, last) > LARGEST_MOTION:
             return "with the board in motion"

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from tautscope.calibration.motion import MotionRecord
-from tautscope.calibration.robot.model import PLAYS, Model
+from tautscope.calibration.robot.model import PLAYS, Model, used_measurements
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 from tautscope.loop.kinematics import Floats
@@ -70,12 +70,13 @@ def fit(record: MotionRecord, config: Config, keep: Sequence[str] = ()) -> Robot
 
     Raises:
         CalibrationError: There are too few measurements.
-        FieldError: `keep` names no parameter.
+        FieldError: `keep` names no parameter, see `check_keep`.
     """
+    count = len(used_measurements(record))
+    if count < LEAST:
+        what = f"{count} measurements in the motion"
+        raise CalibrationError(what, f"Check the sensor, or move for longer: {LEAST} are needed")
     model = Model(record, config, keep)
-    if len(model.own) < LEAST:
-        what = f"{len(model.own)} measurements in the motion"
-        raise CalibrationError(what, f"Move for longer: {LEAST} are needed")
     p = _first(model)
     limits = np.array([dof.width_limit for dof in config.dof])
     variance = (DEVIATION * limits) ** 2

@@ -44,7 +44,7 @@ class Model:
     def __init__(self, record: MotionRecord, config: Config, keep: Sequence[str]) -> None:
         self.config, self.parameters = config, fitted(config, record.measurements, keep)
         self._record, self.signs = record, np.ones(len(config.dof))
-        self.own = _own(record)
+        self.own = used_measurements(record)
         sensors = Sensors(config, build_kinematics(config))
         self.readings = [sensors.reading(each) for each in self.own]
         count, most = len(self.own), max(len(each.values) for each in self.readings)
@@ -158,7 +158,7 @@ class Model:
         return self._last[1]
 
 
-def _own(record: MotionRecord) -> list[Measurement]:
+def used_measurements(record: MotionRecord) -> list[Measurement]:
     """The measurements that are used, of each sensor at most `MOST` evenly."""
     span = record.times[-1] - record.times[0]
     after = record.times[0] + BEFORE * span

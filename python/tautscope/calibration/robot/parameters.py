@@ -1,12 +1,13 @@
 """Parameters of a robot's calibration: priors, and what they change in a configuration."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tautscope._core import MOST_SENSORS
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.measurement import Measurement, Points, Pose, Tip
@@ -35,15 +36,36 @@ def fitted(
     """The parameters that a configuration and its sensors have, less those to keep.
 
     The zeros of an insertion along and a rotation about the axis of "two_planes" are those of the
-    motors: they could not be told from the pose of the base. A name to keep has to be one of them,
-    but "kinematics", of which a robot may have nothing.
+    motors: they could not be told from the pose of the base.
 
     Raises:
-        FieldError: `keep` names none, and is not "kinematics", of which a robot may have nothing.
+        FieldError: As `check_keep`.
     """
-    kinds = {type(each) for each in measurements}
-    poses = [each for each in measurements if isinstance(each, Pose)]
+    check_keep(config, keep)
+    kinds: set[type] = {type(each) for each in measurements}
     sensors = sorted({each.sensor for each in measurements})
+    is_turned = any(each.orientation is not None for each in measurements if isinstance(each, Pose))
+    found = _all(config, kinds, sensors, is_turned=is_turned)
+    return tuple(each for each in found if not any(_is_named(each.name, name) for name in keep))
+
+
+def check_keep(config: Config, keep: Sequence[str]) -> None:
+    """Check names to keep: those of parameters that some sensor of the robot could have.
+
+    Raises:
+        FieldError: A name is none of them, nor "kinematics", of which a robot may have nothing.
+    """
+    found = _all(config, {Tip, Pose, Points}, range(MOST_SENSORS), is_turned=True)
+    names = [each.name for each in found]
+    for name in keep:
+        if name != "kinematics" and not any(_is_named(each, name) for each in names):
+            raise FieldError("--keep", name, ", ".join(names))
+
+
+def _all(
+    config: Config, kinds: Set[type], sensors: Iterable[int], *, is_turned: bool
+) -> list[Parameter]:
+    """The parameters with sensors of some kinds, and poses with an orientation or without."""
     kinematics, found = config.kinematics, []
     is_of_axis = {"insertion", "rotation"} if kinematics.kind == "two_planes" else set()
     for dof in config.dof:
@@ -53,21 +75,17 @@ def fitted(
             found.append(Parameter(f"dof.{dof.name}.lag", 0.0, LAG, 0.0))
     delays = (*config.measurement.delays, *[0.0] * 4)
     found += [Parameter(f"measurement.delays[{k}]", delays[k], DELAY) for k in sensors]
-    if (poses or Points in kinds) and kinematics.kind in {"two_planes", "segments"}:
+    if (Pose in kinds or Points in kinds) and kinematics.kind in {"two_planes", "segments"}:
         for key in ("length", "tip_length"):
             start = getattr(kinematics, key)
             found.append(Parameter(f"kinematics.{key}", start, RELATIVE * start, _SHORTEST))
         if kinematics.kind == "two_planes":
             found.append(Parameter("kinematics.skew", kinematics.skew, ANGLE))
-    if poses:
+    if Pose in kinds:
         found += _vector(config, "base_position", LENGTH) + _vector(config, "base_rotation", ANGLE)
-    if any(each.orientation is not None for each in poses):
+    if is_turned:
         found += _vector(config, "sensor_rotation", ANGLE)
-    names = [each.name for each in found]
-    for name in keep:
-        if name != "kinematics" and not any(_is_named(each, name) for each in names):
-            raise FieldError("--keep", name, ", ".join(names))
-    return tuple(each for each in found if not any(_is_named(each.name, name) for name in keep))
+    return found
 
 
 def _is_named(name: str, by: str) -> bool:
