@@ -75,7 +75,9 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         let mut dofs = settings.dofs;
         let (friction, gain) = if P::IS_COUPLED {
             // The vector law bounds its commands itself: the reference may be as fast as they.
-            dofs.iter_mut().for_each(|dof| dof.gain_limit = 1.0);
+            for dof in &mut dofs {
+                dof.gain_limit = 1.0;
+            }
             (settings.friction, [settings.law.free_gain; N])
         } else {
             (Friction::independent(), dofs.map(|dof| dof.gain_limit))
