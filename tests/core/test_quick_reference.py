@@ -1,5 +1,7 @@
 """An operator's flicks are followed at the speed limit and never stop motion."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -72,3 +74,19 @@ def test_no_flick_of_any_length_and_phase_is_a_jump() -> None:
             positions = length * x**3 * (10 - 15 * x + 6 * x**2)
             change = np.abs(np.diff(positions, n=2)).max()
             assert np.all(change * amplitudes + tremor < allowed), (lasts, phase)
+
+
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_best_follows_as_fast_as_slow_motors_and_paper_at_a_share_of_it(
+    profile: Literal["best", "paper"],
+) -> None:
+    """The desktop rig's motors make 25 mm/s; a sine of 10 mm/s lags behind K_b = 5 only."""
+    config = load_config("desktop", profile)
+    loop, lag = HysteresisReduction(config), 0.0
+    for tick in range(2000):
+        time = tick * config.control.period
+        reference = np.array([0.025 + 0.01 * np.sin(time), 0.0, 0.9])
+        loop.step(reference, time)
+        lag = max(lag, float(np.abs(loop.reference - reference).max()))
+    is_fast = "reference_fast" in loop.supervision.latched
+    assert (is_fast, lag > 1e-3) == ((profile == "paper"),) * 2
