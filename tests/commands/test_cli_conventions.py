@@ -131,6 +131,7 @@ def test_a_file_that_the_disk_has_no_room_for_is_not_left(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     cv2.imwrite("a.png", np.random.default_rng(0).integers(0, 255, (60, 80, 3), np.uint8))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # half a file would break its import
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2000, limits[1]))
     try:
