@@ -165,6 +165,7 @@ impl Configuration {
     }
 
     fn check_article(&self) -> Result<(), Error> {
+        self.check_bands()?;
         let Safety { safety } = self.read()?;
         let is_limited = !safety.off.contains(core::Flag::WidthLimit);
         for (Dof { name, .. }, limit) in self.dofs.iter().zip(safety.offset_limit) {
@@ -191,6 +192,23 @@ impl Configuration {
                     "safety.command_travel[{index}]: got [{low}, {high}], expected the lower limit, then the upper"
                 )));
             }
+        }
+        Ok(())
+    }
+
+    /// Both bands are on the tip, one behind the other.
+    fn check_bands(&self) -> Result<(), Error> {
+        let Instrument { instrument: own } = self.read()?;
+        let (a, b, half) = (own.marker_a, own.marker_b, own.band_length / 2.0);
+        if !(half <= a && a <= b - 2.0 * half) {
+            return Err(Error(format!(
+                "instrument.marker_a: got {a}, expected a band on the tip, proximal of marker_b's band and not overlapping it"
+            )));
+        }
+        if b + half > own.tip_length {
+            return Err(Error(format!(
+                "instrument.marker_b: got {b}, expected a band within tip_length"
+            )));
         }
         Ok(())
     }
@@ -260,6 +278,19 @@ struct Relations {
 #[derive(serde::Deserialize)]
 struct Measurement {
     delays: Vec<f64>,
+}
+
+#[derive(serde::Deserialize)]
+struct Instrument {
+    instrument: Bands,
+}
+
+#[derive(serde::Deserialize)]
+struct Bands {
+    marker_a: f64,
+    marker_b: f64,
+    band_length: f64,
+    tip_length: f64,
 }
 
 #[derive(serde::Deserialize)]

@@ -209,6 +209,20 @@ fn errors_of_initial_offsets_name_their_limits() {
 }
 
 #[test]
+fn both_bands_are_on_the_tip() {
+    check_errors(&[
+        (
+            "[instrument]\nmarker_a = 0.011\nmarker_b = 0.005".into(),
+            "instrument.marker_a: got 0.011, expected a band on the tip, proximal",
+        ),
+        (
+            "[instrument]\nmarker_b = 0.019".into(),
+            "instrument.marker_b: got 0.019, expected a band within tip_length",
+        ),
+    ]);
+}
+
+#[test]
 fn a_delay_is_within_history_and_age() {
     check_errors(&[
         (
