@@ -165,7 +165,6 @@ function megabytes(bytes) {
 }
 
 function duration(seconds) {
-  if (seconds === null) return "–";
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
 }
 
@@ -176,6 +175,7 @@ function facts() {
     "image to screen": state.latency ? `${state.latency.map((time) => (1000 * time).toFixed(0)).join(" ms, 95 %: ")} ms` : "–",
     "images dropped": image.dropped,
   };
+  const room = log.remaining === null ? "" : `, room for ${duration(log.remaining)}`;
   const [since, before] = updates[0] ?? [0, 0];
   const measured = state.time > since ? (image.updates - before) / (state.time - since) : 0;
   const list = {
@@ -187,7 +187,7 @@ function facts() {
     drives: state.drives,
     "late ticks": late[1] ? `${late[0]} of ${late[1]}` : "–",
     "commands refused": refused,
-    log: log.failure || (log.path ? `${log.path}, ${megabytes(log.size)}, room for ${duration(log.remaining)}` : "–"),
+    log: log.failure || (log.path ? `${log.path}, ${megabytes(log.size)}${room}` : "–"),
     "not logged": log.dropped,
   };
   $("facts").innerHTML = Object.keys(list).map(() => "<div><dt></dt><dd></dd></div>").join("");
