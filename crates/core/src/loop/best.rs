@@ -29,7 +29,7 @@ const CONTACT: f64 = 0.9;
 /// Shift of the image, over its standard deviation before and after the images, from which on the geometry counts as wrong.
 const CERTAIN: f64 = 3.0;
 /// Standard deviation by which an image without markers makes the tip less certain, and up to which, in `start_deviation`:
-/// beyond it, a bend in the opposite direction, half a turn on, would be found as well.
+/// a tip that rests stays where it is, however long it is not seen.
 const MISS: f64 = 0.03;
 const MISSED: f64 = 0.5;
 /// Plays of the past that are kept for measurements that arrive late, over the history's span.
