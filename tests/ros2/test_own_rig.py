@@ -114,6 +114,30 @@ def test_a_stop_that_the_drives_do_not_confirm_is_in_the_fault(
         assert both.control.fault in [each.data for each in both.drain(both.warnings)]
 
 
+class NotDisabled(Disabled):
+    def disable(self) -> None:
+        super().disable()
+        raise StateError("bend_x", "quick stop is not confirmed", "Cut the power")
+
+
+def test_a_stop_that_is_not_confirmed_stays_a_fault_until_the_rig_is_enabled(
+    tmp_path: Path,
+) -> None:
+    arm, config = NotDisabled(), tautscope.axes(2, width_limit=1.2, unit="rad")
+    arm.duration = 0.0
+    make: Any = lambda _: arm  # noqa: E731
+    with peers(config, tmp_path, make_rig=make) as both:
+        both.enable(np.zeros(2))
+        for _ in range(2):
+            both.request("disable")
+            assert both.control.operating_state == "FAULT"
+            assert "not confirmed" in both.control.fault
+            assert both.control.is_unconfirmed
+        both.enable(np.zeros(2))
+        assert both.control.operating_state == "ENABLED"
+        assert not both.control.is_unconfirmed
+
+
 class OffClock(Arm):
     """Its sensor's clock is not the rig's."""
 

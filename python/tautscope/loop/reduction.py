@@ -515,7 +515,8 @@ class HysteresisReduction:
     def estimated_config(self) -> Config:
         """The configuration with the contact offsets estimated so far as initial ones.
 
-        A loop made of it, the next day or for the next episode, begins with this slack.
+        A loop made of it, the next day or for the next episode, begins near this slack: within 8 %
+        from a third of `width_limit` on, and never below a sixth of it.
         `tautscope.config.dump_config` writes it.
         """
         document = to_document(self._config)

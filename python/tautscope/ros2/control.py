@@ -41,6 +41,8 @@ class NodeControl:
     Attributes:
         run: The present run; None if the node is not active.
         fault: Why the last run ended, if no request ended it.
+        is_unconfirmed: Whether the rig did not confirm its last stop: until it is enabled again,
+            the motors may move.
 
     Raises:
         ConfigError: Without a rig of its own nothing would measure the tip.
@@ -79,7 +81,7 @@ class NodeControl:
         self._rig: Rig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
-        self._is_disabling = False
+        self.is_unconfirmed = self._is_disabling = False
         self._runs = 0
         self._node = node
         self._commands = node.subscription(
@@ -162,6 +164,9 @@ class NodeControl:
             self.lifecycle.trigger(CONFIGURE)
             self.lifecycle.trigger(ACTIVATE)
         elif command == "disable":
+            if self.is_unconfirmed:
+                self._telemetry.warn(self.fault)  # a rig that is left cannot be asked again
+                return
             self.fault, self._is_disabling = "", True
             self._states.accept(command, self._reaction)
             self.lifecycle.trigger(DEACTIVATE)
@@ -195,6 +200,7 @@ class NodeControl:
                 try:
                     self._rig.close()
                 except TautscopeError as unconfirmed:
+                    self.is_unconfirmed = True
                     faults.append(described(unconfirmed))
             self._set_fault("; ".join(faults))
             # A rig that cannot be stopped orderly is left in any case.
@@ -215,6 +221,7 @@ class NodeControl:
         self._telemetry.state(self.operating_state, is_busy=True)
         warm_up(self._config)
         sample = reset_unless(rig, lambda: self._take_command() in ("disable", "pause"))
+        self.is_unconfirmed = False
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
@@ -232,14 +239,16 @@ class NodeControl:
         run, self.run = self.run, None
         if run is None:
             return
-        if not self.fault:
-            self._states.goal = OperatingState.DISABLED
+        self.is_unconfirmed = True
         try:
             if self._rig is not None and self._is_disabling:
                 disable(self._rig)
             elif self._rig is not None:
                 self._rig.close()
+            self.is_unconfirmed = False
         finally:
+            is_fault = self.fault or self.is_unconfirmed
+            self._states.goal = OperatingState.FAULT if is_fault else OperatingState.DISABLED
             self._publish_state()
             try:
                 self._tell_result(run)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tautscope.config import Config
+from tautscope.errors import STOPPED
 from tautscope.hardware.realtime import (
     LOOP,
     OTHERS,
@@ -33,7 +34,7 @@ def start_node(
     make_rig: MakeRig | None,
     **options: Any,
 ) -> int:
-    """Run the node until it is finalized, or a signal; the exit status.
+    """Run the node until it is finalized, or a signal; exit status 4 after an unconfirmed stop.
 
     The motors are quick-stopped and the log is closed on every exit. The caller closes the node;
     `announce` is called with its name when it is ready. The options are those of `NodeControl`.
@@ -56,8 +57,8 @@ def start_node(
                 announce(node.identity.path)
                 control.main()
             except KeyboardInterrupt:
-                return 0
+                pass
             finally:
                 with defer_signals():
                     control.shut_down()
-    return 0
+    return STOPPED if control.is_unconfirmed else 0
