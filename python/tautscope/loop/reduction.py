@@ -10,6 +10,7 @@ from enum import StrEnum
 from functools import cached_property, partial, wraps
 from itertools import compress
 from threading import RLock
+from time import perf_counter
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
 import numpy as np
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from tautscope.loop.vision import Detection, MarkerDetector
 
 Method = TypeVar("Method", bound=Callable[..., Any])
+Result = TypeVar("Result")
 Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
@@ -166,9 +168,18 @@ def _exclusive(call: Method) -> Method:
     @wraps(call)
     def wait(loop: HysteresisReduction, /, *arguments: Any, **keys: Any) -> Any:
         with loop._lock:
+            if loop._is_calling:
+                where = "a call in predict, jacobian, tip, points or actuators.map"
+                raise SignalError(call.__name__, where, "a call outside of them")
             return call(loop, *arguments, **keys)
 
     return cast(Method, wait)
+
+
+def _captured_at(frame: Frame) -> float:
+    if not isinstance(frame, Frame):
+        raise SignalError("frame", type(frame).__name__, "a tautscope.Frame")
+    return check_time("captured_at", frame.captured_at)
 
 
 class HysteresisReduction:
@@ -191,7 +202,7 @@ class HysteresisReduction:
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = check_config(config)
-        self._lock = RLock()
+        self._lock, self._is_calling = RLock(), False
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
@@ -253,14 +264,14 @@ class HysteresisReduction:
             self._log_warnings(time, now)
             self._log_interval(time)
         limit = None if self._actuators is None else self._within_limits
-        return self._loop.step(values, time, made_at, limit)
+        return self._calling(self._loop.step, values, time, made_at, limit)
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state and the offsets, Eqs. (4)-(16).
 
         Raises:
             FrameError: The image is not what the configured camera gives.
-            SignalError: The capture time is not finite.
+            SignalError: It is no `Frame`, or its capture time not finite.
         """
         return self.on_detection(frame, self._detection(frame)())
 
@@ -272,7 +283,7 @@ class HysteresisReduction:
         copy of a buffer that the camera reuses.
 
         Raises:
-            SignalError: The capture time is not finite.
+            SignalError: As `on_frame`.
         """
         detect = self._detection(frame)
         self._notify(f"prepare_detection {frame.sequence}")
@@ -280,7 +291,7 @@ class HysteresisReduction:
 
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """Second part of `on_frame`: the update with the result of `prepare_detection`."""
-        captured_at = check_time("captured_at", frame.captured_at)
+        captured_at = _captured_at(frame)
         found = any(detection.found)
         features, covariance = (detection.features, detection.covariance) if found else (None, None)
         return self._update(features, covariance, captured_at, detection, checksum(frame.image))
@@ -389,9 +400,14 @@ class HysteresisReduction:
             sensor: Which of 4 sensors, each with its own rate and delay.
 
         Raises:
-            SignalError: As `on_tip`; a result of `predict` or `jacobian` has another shape.
+            SignalError: As `on_tip`; `predict` or `jacobian` is no function, or a result of it has
+                another shape.
         """
         sensors = self._axes_sensors("on_measurement")
+        derived = predict if jacobian is None else jacobian
+        for name, given in (("predict", predict), ("jacobian", derived)):
+            if not callable(given):
+                raise SignalError(name, given, "a function of q (n,)")
         found = check_values(values)
         known = check_covariance("covariance", covariance, len(found))
         reading = sensors.own(found, known, predict, jacobian)
@@ -537,7 +553,7 @@ class HysteresisReduction:
 
     def _detection(self, frame: Frame) -> Callable[[], Detection]:
         self._band_loop("on_frame")
-        prediction = self.predict_state(check_time("captured_at", frame.captured_at))
+        prediction = self.predict_state(_captured_at(frame))
         return partial(self._detector.detect, frame.image, None, prediction)
 
     def _band_loop(self, call: str) -> _core.Reduction:
@@ -558,9 +574,25 @@ class HysteresisReduction:
             raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
-        known = reading.values, reading.covariance
-        result = self._loop.on_reading(*known, captured_at, reading.model, reading.point, sensor)
+        known, begin = (reading.values, reading.covariance), perf_counter()
+        given = *known, captured_at, reading.model, reading.point, sensor
+        result = self._calling(self._loop.on_reading, *given)
+        took, period = perf_counter() - begin, self._config.control.period
+        if reading.name and took > period:  # the flags of late ticks blame other programs
+            what = "at %.3f s: an update took %.2g s, with %d calls of %s, and step waited for it. "
+            what += "More than control.period = %g s makes ticks late: make %s faster, or give "
+            what += "on_measurement a jacobian"
+            facts = captured_at, took, next(reading.calls), reading.name, period, reading.name
+            self._log_once(reading.name, what, *facts)
         return self._report(result, captured_at)
+
+    def _calling(self, call: Callable[..., Result], *arguments: Any) -> Result:
+        """Result of a call that calls functions of the user's, which cannot use the loop."""
+        try:
+            self._is_calling = True
+            return call(*arguments)
+        finally:
+            self._is_calling = False
 
     def _within_limits(self, last: Floats, command: Floats) -> Floats:
         assert self._actuators is not None
