@@ -166,7 +166,7 @@ def test_the_log_names_a_slow_model_its_calls_and_the_remedy(
         loop.on_measurement([0.0, 0.0], 0.005 + 1e-4 * tick, EYE, predict)
         calls.append(0)
     (line,) = (each for each in caplog.messages if "predict(q)" in each)
-    for part in (f"{calls[0]} calls of predict(q)", "control.period", "jacobian", "step waited"):
+    for part in (f"{calls[0]} calls of predict(q)", "control.period", "jacobian", "step waits"):
         assert part in line, line
 
 
@@ -178,7 +178,7 @@ def test_the_log_names_a_slow_tip(caplog: pytest.LogCaptureFixture) -> None:
 def test_a_tip_measured_as_it_is_has_no_model_to_be_slow(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tautscope.loop.reduction.perf_counter", count().__next__)
+    monkeypatch.setattr("tautscope.loop.measurement.perf_counter", count().__next__)
     moved(ROBOT).on_tip([0.0, 0.0], 0.005)
     assert not caplog.messages
     by_pose(moved(own(Fresh)))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import count
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -90,8 +90,9 @@ class Reading:
         model: Of values and derivatives.
         predict: The values of the model alone.
         point: How many values are one point.
-        name: Of the user's function, for messages; empty without one.
-        calls: Next is how often `predict` was called.
+        name: Of the function that `predict` calls, for messages.
+        calls: How often `model` calls it.
+        times: How long each call of `model` took [s], if it calls one.
     """
 
     values: Floats
@@ -100,7 +101,8 @@ class Reading:
     predict: Predict
     point: int = 1
     name: str = ""
-    calls: "count[int]" = field(default_factory=count)
+    calls: int = 0
+    times: list[float] = field(default_factory=list)
 
 
 class Sensors:
@@ -163,20 +165,23 @@ class Sensors:
         name: str = "predict(q)",
     ) -> Reading:
         """Reading of values (m,) by a model of the user's, with its Jacobian or by differences."""
-        calls = count()
 
         def checked(q: Floats) -> Floats:
-            next(calls)
             return check_result(name, predict(q), values.shape)
 
         steps = STEP * self._widths
         derive = jacobian or partial(jacobian_by_differences, checked, steps=steps)
+        calls = 1 if jacobian else 1 + 2 * self._count
+        times: list[float] = []
 
         def model(q: Floats) -> tuple[Floats, Floats]:
+            begin = perf_counter()
             rows = check_result("jacobian(q)", derive(q), (len(values), len(q)))
-            return checked(q), rows
+            found = checked(q)
+            times.append(perf_counter() - begin)
+            return found, rows
 
-        return Reading(values, covariance, model, checked, point, name, calls)
+        return Reading(values, covariance, model, checked, point, name, calls, times)
 
     @cached_property
     def _with_tip(self) -> Kinematics:

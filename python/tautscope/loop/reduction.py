@@ -10,7 +10,6 @@ from enum import StrEnum
 from functools import cached_property, partial, wraps
 from itertools import compress
 from threading import RLock
-from time import perf_counter
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast
 
 import numpy as np
@@ -574,16 +573,10 @@ class HysteresisReduction:
             raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
-        known, begin = (reading.values, reading.covariance), perf_counter()
+        known = reading.values, reading.covariance
         given = *known, captured_at, reading.model, reading.point, sensor
         result = self._calling(self._loop.on_reading, *given)
-        took, period = perf_counter() - begin, self._config.control.period
-        if reading.name and took > period:  # the flags of late ticks blame other programs
-            what = "at %.3f s: an update took %.2g s, with %d calls of %s, and step waited for it. "
-            what += "More than control.period = %g s makes ticks late: make %s faster, or give "
-            what += "on_measurement a jacobian"
-            facts = captured_at, took, next(reading.calls), reading.name, period, reading.name
-            self._log_once(reading.name, what, *facts)
+        self._log_slow(reading, captured_at)
         return self._report(result, captured_at)
 
     def _calling(self, call: Callable[..., Result], *arguments: Any) -> Result:
@@ -632,6 +625,17 @@ class HysteresisReduction:
             what = "control ticks come every %.4g s: set control.period to it. With %g s limits "
             what += "of speed are wrong by the ratio, and later ticks may move nothing"
             self._log_once("interval", what, interval, period)
+
+    def _log_slow(self, reading: Reading, time: float) -> None:
+        # The flags of late ticks blame other programs. These make some calls longer, not the least.
+        took = len(reading.times) * min(reading.times, default=0.0)
+        period, name = self._config.control.period, reading.name
+        if took > period:
+            what = "at %.3f s: an update takes %.2g s, with %d calls of %s, and step waits for it. "
+            what += "More than control.period = %g s makes ticks late: make %s faster, give "
+            what += "on_measurement a jacobian, or use a longer period"
+            calls = reading.calls * len(reading.times)
+            self._log_once(name, what, time, took, calls, name, period, name)
 
     def _log_once(self, key: str, text: str, *values: object) -> None:
         if key not in self._logged:
