@@ -25,6 +25,7 @@ from tautscope.config import (
     load_config,
     to_document,
 )
+from tautscope.config.edit import edited_text
 from tautscope.config.load import config_file
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
@@ -233,6 +234,16 @@ def test_a_missing_or_invalid_file_is_named(tmp_path: Path) -> None:
         load_config(tmp_path / "none.toml")
     with pytest.raises(MissingPathError):
         load_config(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "[" * 5000, "a = " + "{a = " * 5000, ".".join("a" * 5000) + " = 1"]
+)
+def test_a_file_nested_without_end_is_an_error(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigError, match="config: got"):
+        loaded(tmp_path, text)
+    with pytest.raises(ConfigError, match="config: got"):
+        edited_text(text, {"twin.seed": 1})
 
 
 def test_replace_checks_and_does_not_change_the_original() -> None:

@@ -48,6 +48,7 @@ def rotation(**changes: Any) -> dict[str, Any]:
         ({"state_timeout": 1000}, "drives.state_timeout", "at most 60"),
         ({"request_timeout": 300}, "drives.request_timeout", "at most 60"),
         ({"following_timeout": 50}, "drives.following_timeout", "0.001 to 1.5"),
+        ({"following_timeout": 1e308}, "drives.following_timeout", "0.001 to 1.5"),
         ({"heartbeat_timeout": 50}, "drives.heartbeat_timeout", "0.001 to 5"),
         ({"reply_timeout": 0.02}, "drives.reply_timeout", "less than cycle"),
         ({"heartbeat_timeout": 0.15}, "drives.heartbeat_timeout", "two heartbeats"),

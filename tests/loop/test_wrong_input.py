@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tautscope import (
     Camera,
@@ -26,10 +27,13 @@ from tautscope.config import from_document
 from tautscope.errors import FieldError, SignalError
 from tautscope.loop.rig import check_sample
 from tautscope.loop.signal_checks import check_covariance
+from tautscope.loop.state_prediction import StatePrediction
 
+Floats = NDArray[np.float64]
 NAN, EYE = float("nan"), np.eye(3)
 HUGE = 10**400
 """No float has this value."""
+IMAGE: Any = np.zeros((Config().camera.height, Config().camera.width, 3), np.uint8)
 FILE: Any = "rig.toml"
 
 
@@ -42,6 +46,27 @@ class Quaternion:
 
     def tip(self, _: object) -> object:
         return np.zeros(3), np.zeros(4)
+
+
+class Words:
+    """Points and a tip that are no numbers, once the loop is made."""
+
+    def tip(self, q: Floats) -> object:
+        is_first = bool(q[0] == 0.0)
+        return [0.0, 0.0, 0.0 if is_first else "far"], np.eye(3)
+
+    def points(self, _: object) -> object:
+        return ["a", "b"]
+
+
+class Transposed:
+    """Three points, a column each."""
+
+    def tip(self, _: object) -> object:
+        return np.zeros(3), np.eye(3)
+
+    def points(self, _: object) -> object:
+        return np.zeros((2, 3))
 
 
 class PositionOnly:
@@ -60,12 +85,20 @@ def planes(**sections: Any) -> Config:
     return from_document({"dof": dofs, "kinematics": {"kind": "two_planes"}} | sections)
 
 
+def bend(**keys: Any) -> Config:
+    """Of "two_planes" and, without a name, of "segments"."""
+    other = {"name": "bend_y", "width_limit": 1.0}
+    kind = {"kind": "two_planes" if "name" in keys else "segments"}
+    dofs = [{"name": "a", "width_limit": 1.0} | keys, other]
+    return from_document({"dof": dofs, "kinematics": kind})
+
+
 def kind(name: str) -> HysteresisReduction:
     return HysteresisReduction(planes(kinematics={"kind": name}))
 
 
-def loop() -> HysteresisReduction:
-    made = HysteresisReduction(planes())
+def loop(name: str = "two_planes") -> HysteresisReduction:
+    made = kind(name)
     made.step([0.0, 0.0], 0.0)
     return made
 
@@ -133,6 +166,17 @@ CONFIGURATIONS: list[Case] = [
     (lambda: planes(kinematics={"length": 0}), "kinematics.length", "0", "above 0"),
     (lambda: planes(kinematics={"kind": "two_planes", "without": ["grip"]}),
      "kinematics.without[0]", "grip", "a name of [[dof]]"),
+    (lambda: bend(name="insertion", width_limit=12.0, range=[0, 100]),
+     "dof[0].unit", "rad", 'unit = "m" and its other values in m'),
+    (lambda: bend(name="insertion", unit="m", width_limit=12.0),
+     "dof[0].width_limit", "12.0", "at most 1 m"),
+    (lambda: bend(name="rotation", unit="m"), "dof[0].unit", "m", 'unit = "rad"'),
+    (lambda: bend(name="bend_x", unit="m"), "dof[0].unit", "m", 'unit = "rad"'),
+    (lambda: bend(name="bend_x", width_limit=5.0, range=[-90, 90]),
+     "dof[0].range", "-90", "6.28, a turn; in rad, not degrees"),
+    (lambda: bend(name="bend_x", width_limit=30.0), "dof[0].width_limit", "30.0", "not degrees"),
+    (lambda: bend(unit="m"), "dof[0].unit", "m", 'unit = "rad"'),
+    (lambda: bend(range=[0.0, 7.0]), "dof[0].range", "7.0", "not degrees"),
     (lambda: planes(kinematics={"without": ["bend_x"]}), "kinematics.without[0]", "bend_x", "kind"),
     (lambda: kind("joint"), "kinematics.kind", "joint", '"two_planes"'),
     (lambda: kind("no_such_module:Robot"), "kinematics.kind", "no_such_module", "module:Class"),
@@ -207,6 +251,31 @@ SIGNALS: list[Case] = [
     (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda q: q), "predict(q)", "(2,)", "(1,)"),
     (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda q: q[:1], jacobian=lambda q: q),
      "jacobian(q)", "(2,)", "(1, 2)"),
+    (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda _: "a"),  # type: ignore[arg-type]
+     "predict(q)", "'a'", "an array (1,)"),
+    (lambda: loop().on_measurement([1.0, 1.0], 0.0, EYE[:2, :2], lambda _: [[1], [1, 2]]),  # type: ignore[arg-type]
+     "predict(q)", "[1, 2]", "an array (2,)"),
+    (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], None),  # type: ignore[arg-type]
+     "predict", "None", "a function of q"),
+    (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], len, jacobian=EYE),  # type: ignore[arg-type]
+     "jacobian", "1.", "a function of q"),
+    (lambda: loop("test_wrong_input:Words").on_pose([0.0] * 3, 0.0), "tip(q)", "far", "array (3,)"),
+    (lambda: loop("test_wrong_input:Words").on_points([[0.0, 0.0]], 0.0),
+     "points(q)", "'a'", "an array (1, 2)"),
+    (lambda: loop("test_wrong_input:Transposed").on_points(np.zeros((3, 2)), 0.0),
+     "points(q)", "(2, 3)", "an array (3, 2)"),
+    (lambda: HysteresisReduction(Config()).on_frame(IMAGE),
+     "frame", "ndarray", "a tautscope.Frame"),
+    (lambda: HysteresisReduction(Config()).on_detection(None, None),  # type: ignore[arg-type]
+     "frame", "NoneType", "a tautscope.Frame"),
+    (lambda: MarkerDetector(Config()).detect(IMAGE, None, np.zeros(3)),  # type: ignore[arg-type]
+     "expectation", "ndarray", "a StatePrediction"),
+    (lambda: MarkerDetector(Config()).detect(IMAGE, None, StatePrediction(EYE[0], EYE[0, :2])),
+     "expectation.std", "[1.0, 0.0]", "3 numbers"),
+    (lambda: MarkerDetector(Config()).regions_in(IMAGE, [(0, 0, 5)]),  # type: ignore[list-item]
+     "windows", "[[0.0, 0.0, 5.0]]", "four whole numbers"),
+    (lambda: MarkerDetector(Config()).regions_in(IMAGE, [(0, 0, 5, NAN)]),  # type: ignore[list-item]
+     "windows", "nan", "four whole numbers"),
     (lambda: loop().on_features(np.ones(4), 0.0), "on_features", "[[dof]]", "on_tip"),
     (lambda: HysteresisReduction(Config()).on_features(list("abcd"), 0.0),
      "features", "'a'", "4 finite numbers"),

@@ -1,6 +1,7 @@
 """Figures of merit, on signals with a known result."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -105,6 +106,29 @@ def test_signals_of_different_length_are_an_error() -> None:
         metrics.loop_width([0, 1], [0, 1, 2])
     with pytest.raises(SignalError, match="x: got"):
         metrics.loop_width([[0, 1]], [0, 1])
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: metrics.tip_overspeed(np.arange(3), np.zeros(9), np.zeros(9)), "time"),
+        (lambda: metrics.marker_errors(np.zeros(4), np.zeros(4)), "measured"),
+        (lambda: metrics.marker_errors(np.zeros((3, 4)), np.zeros((2, 4))), "truth"),
+        (lambda: metrics.marker_rms(np.zeros((3, 2)), np.zeros((3, 2))), "measured"),
+        (lambda: metrics.creep(np.zeros((5, 3)), np.zeros((5, 2))), "references"),
+        (lambda: metrics.creep(np.zeros((5, 3)), 0.0), "references"),
+        (
+            lambda: metrics.period_widths(
+                np.arange(9.0), np.zeros(99), np.zeros(99), start=0, period=2, periods=3
+            ),
+            "time",
+        ),
+    ],
+)
+def test_arrays_that_do_not_fit_are_named(call: Callable[[], object], field: str) -> None:
+    with pytest.raises(SignalError) as caught:
+        call()
+    assert caught.value.field == field
 
 
 def test_reduction_is_the_share_removed() -> None:

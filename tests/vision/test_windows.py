@@ -54,9 +54,10 @@ def test_regions_of_a_window_are_those_of_the_mask_there(seed: int) -> None:
     mask = detector.mask(image).astype(np.uint8)
     found = 0
     for _ in range(20):
-        left, right = sorted(rng.integers(0, width + 20, 2).tolist())
-        top, bottom = sorted(rng.integers(0, height + 20, 2).tolist())
+        left, right = sorted(rng.integers(-20, width + 20, 2).tolist())
+        top, bottom = sorted(rng.integers(-20, height + 20, 2).tolist())
         regions = detector.regions_in(image, [(left, top, right, bottom)])
+        left, top, right, bottom = (max(0, edge) for edge in (left, top, right, bottom))
         part = mask[top:bottom, left:right]
         if not part.size:
             assert regions == (), f"{seed=}"

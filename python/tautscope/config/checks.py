@@ -73,8 +73,24 @@ def check_axes(
         require(is_shared, f"{path}.friction", dof.friction, "the name of two or more DOFs")
         allowed = f"its default: {path} shares no friction"
         require(bool(dof.friction) or dof.lever == 1.0, f"{path}.lever", dof.lever, allowed)
+        if dof.name in known and dof.name not in kinematics.without:
+            _check_unit(path, dof, kinematics.kind == "segments")
     require_defaults(safety, "safety", _OF_THE_ARTICLE, "[[dof]] has its own")
     require_defaults(estimation, "estimation", _OF_IMAGES, "[[dof]] has no bands")
+
+
+def _check_unit(path: str, dof: DofEntry, is_of_segments: bool) -> None:
+    """Check that a degree of freedom has the unit that "two_planes" and "segments" compute with."""
+    is_bend = is_of_segments or dof.name in ("bend_x", "bend_y")
+    unit = "m" if dof.name == "insertion" and not is_bend else "rad"
+    if is_bend or dof.name in ("insertion", "rotation"):
+        allowed = f'unit = "{unit}" and its other values in {unit}, as the kinematics needs'
+        require(dof.unit == unit, f"{path}.unit", dof.unit, allowed)
+    if is_bend:
+        turn, most = 2 * math.pi, max(map(abs, dof.range or (0.0,)))
+        allowed = f"at most {turn:.3g}, a turn; in rad, not degrees"
+        require(most <= turn, f"{path}.range", dof.range, allowed)
+        require(dof.width_limit <= turn, f"{path}.width_limit", dof.width_limit, allowed)
 
 
 _OF_IMAGES = (

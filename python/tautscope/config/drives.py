@@ -206,9 +206,8 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             ("following_timeout", 1.5),
         ):
             value = getattr(self, name)
-            is_whole = math.isclose(value * 1e3, round(value * 1e3))
-            allowed = f"whole milliseconds, 0.001 to {most}"
-            require(0.001 <= value <= most and is_whole, name, value, allowed)
+            is_valid = 0.001 <= value <= most and math.isclose(value * 1e3, round(value * 1e3))
+            require(is_valid, name, value, f"whole milliseconds, 0.001 to {most}")
         reply, cycle = self.reply_timeout, self.cycle
         require(reply < cycle, "reply_timeout", reply, f"less than cycle = {cycle}")
         least, timeout = 2 * max(self.heartbeat_period, cycle), self.heartbeat_timeout

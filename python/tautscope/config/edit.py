@@ -78,7 +78,7 @@ def edited_text(text: str, values: Mapping[str, Any]) -> str:
     for inline_too in (False, True):  # a header among dotted keys would take the keys below it
         try:
             document = _edited(text, values, inline_too)
-        except tomlkit.exceptions.TOMLKitError as error:
+        except (tomlkit.exceptions.TOMLKitError, RecursionError) as error:
             raise ConfigError("config", text.partition("\n")[0], f"TOML ({error})") from None
         edited = tomlkit.dumps(document)
         with suppress(tomllib.TOMLDecodeError):

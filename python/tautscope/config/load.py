@@ -39,7 +39,7 @@ def load_config(path: str | PathLike[str] | None = None, profile: Profile | None
         document = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError:
         raise MissingPathError("config", str(file), "a readable TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ConfigError("config", str(file), f"TOML ({error})") from None
     _LOG.info("configuration: %s", file.absolute())
     _resolve_paths(document, file.absolute().parent)

@@ -155,10 +155,13 @@ def from_document(document: dict[str, Any]) -> Config:
 
 
 def _checked(document: dict[str, Any]) -> Config:
-    document = _merged(to_document(Config()), without_numpy(document))
-    if isinstance(document.get("drives"), dict):
-        document["drives"] = with_drive_defaults(document["drives"])
-    config: Config = converted_value("", document, Config)
+    try:
+        document = _merged(to_document(Config()), without_numpy(document))
+        if isinstance(document.get("drives"), dict):
+            document["drives"] = with_drive_defaults(document["drives"])
+        config: Config = converted_value("", document, Config)
+    except RecursionError:
+        raise ConfigError("config", "hundreds of tables in each other", "a few") from None
     return config
 
 

@@ -62,5 +62,5 @@ def read_header(
         return config, *facts, json.loads(texts[topics.VERSIONS])
     except ConfigError:
         raise
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None

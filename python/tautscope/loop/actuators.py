@@ -14,7 +14,7 @@ from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.named_class import instance, named_class
 from tautscope.loop.rig import Rig, Sample
-from tautscope.loop.signal_checks import check_signal
+from tautscope.loop.signal_checks import as_numbers, check_signal
 
 Map = Callable[[Floats], ArrayLike]
 _LOG = logging.getLogger(__name__)
@@ -55,9 +55,7 @@ class Actuators:
         values = check_signal("command", command, (self._count,))
         if self._forward is None:
             return np.asarray(self._matrix @ values + self._offsets)
-        found = self._forward(values)
-        count = len(self._config.limits) or max(1, np.size(found))
-        return check_signal("actuators.map", found, (count,))
+        return _copy("actuators.map", self._forward(values.copy()), len(self._config.limits))
 
     def dofs(self, motors: ArrayLike) -> Floats | None:
         """Degrees of freedom (n,) of positions (m,) of the motors; None if the map has no way back.
@@ -73,8 +71,8 @@ class Actuators:
             return np.asarray(self._inverse @ (values - self._offsets))
         if self._backward is None:
             return None
-        values = check_signal("sample.applied", motors, (max(1, np.size(motors)),))
-        return check_signal("actuators.map", self._backward(values), (self._count,))
+        values = _copy("sample.applied", motors)
+        return _copy("actuators.map", self._backward(values), self._count)
 
     def excess(self, command: ArrayLike) -> str:
         """The motors beyond their limits at a command, in words; empty if there are none."""
@@ -121,6 +119,12 @@ class Actuators:
             share = np.divide(room, moved, out=np.zeros_like(moved), where=moved != 0.0)
             end = start + float(share.clip(0.0, 1.0).min()) * (end - start)
         return start
+
+
+def _copy(field: str, values: ArrayLike, count: int = 0) -> Floats:
+    """Finite numbers (count,), or any (m,): a user's map may change its argument and its result."""
+    array = as_numbers(field, values, "finite numbers")
+    return check_signal(field, array, (count or max(1, array.size),)).copy()
 
 
 def _user_map(name: str) -> tuple[Map, Map | None]:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config, KinematicsConfig
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.named_class import instance, named_class
+from tautscope.loop.signal_checks import check_result
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
@@ -80,7 +81,32 @@ class TwoPlanes:
         return about @ position, about @ turned
 
 
-class Placed:
+class Own:
+    """A class of the user's, whose tip is checked and copied."""
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self.own = kinematics
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "own" or name.startswith("_"):  # copies and pickles ask before there is one
+            raise AttributeError(name)
+        return getattr(self.own, name)
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,).
+
+        Raises:
+            SignalError: The class returned something else.
+        """
+        found: object = self.own.tip(q)
+        if not isinstance(found, tuple | list) or len(found) != 2:
+            allowed = "a position (3,) and a rotation matrix (3, 3)"
+            raise SignalError("tip(q)", type(found).__name__, allowed)
+        position, rotation = found
+        return check_result("tip(q)", position, (3,)), check_result("tip(q)", rotation, (3, 3))
+
+
+class Placed(Own):
     """A kinematics in the frame of a sensor.
 
     With the base's position b and rotation B, and the rotation S of the sensor at the tip,
@@ -89,15 +115,10 @@ class Placed:
     """
 
     def __init__(self, kinematics: Kinematics, config: KinematicsConfig) -> None:
-        self.own = kinematics
+        super().__init__(kinematics)
         self._position = np.array(config.base_position)
         self._base = rotation_matrix(np.array(config.base_rotation))
         self._sensor = rotation_matrix(np.array(config.sensor_rotation))
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "own" or name.startswith("_"):  # copies and pickles ask before there is one
-            raise AttributeError(name)
-        return getattr(self.own, name)
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) that the sensor measures in a state."""
@@ -178,7 +199,7 @@ def own_kinematics(config: Config) -> Kinematics | None:
     kinematics = instance(field, kind, named_class(field, kind, allowed))
     if not isinstance(kinematics, Kinematics):
         raise ConfigError(field, kind, "a class with the method tip(q)")
-    return kinematics
+    return Own(kinematics)
 
 
 def jacobian_by_differences(predict: Predict, q: Floats, steps: Floats) -> Floats:

@@ -1,8 +1,9 @@
 """What a sensor measures of the tip, as values, covariance and a model of the sensor."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,17 @@ from tautscope.loop.kinematics import (
     STEP,
     Floats,
     Kinematics,
-    Placed,
     Predict,
     jacobian_by_differences,
     rotation_vector,
 )
-from tautscope.loop.signal_checks import as_floats, as_numbers, check_covariance, check_numbers
+from tautscope.loop.signal_checks import (
+    as_floats,
+    as_numbers,
+    check_covariance,
+    check_numbers,
+    check_result,
+)
 
 Model = Callable[[Floats], tuple[Floats, Floats] | None]
 """State (n,) to the values (m,) that would be measured and their derivatives (m, n)."""
@@ -84,6 +90,9 @@ class Reading:
         model: Of values and derivatives.
         predict: The values of the model alone.
         point: How many values are one point.
+        name: Of the function that `predict` calls, for messages.
+        calls: How often `model` calls it.
+        times: How long each call of `model` took [s], if it calls one.
     """
 
     values: Floats
@@ -91,6 +100,9 @@ class Reading:
     model: Model
     predict: Predict
     point: int = 1
+    name: str = ""
+    calls: int = 0
+    times: list[float] = field(default_factory=list)
 
 
 class Sensors:
@@ -119,7 +131,8 @@ class Sensors:
             place = check_numbers("position", measurement.position, (3,))
             std = np.full(3, settings.position_deviation)
             if measurement.orientation is None:
-                return self.own(place, _covariance(given, std), lambda q: kinematics.tip(q)[0])
+                known = _covariance(given, std)
+                return self.own(place, known, lambda q: kinematics.tip(q)[0], name="tip(q)")
             turned = check_rotation(measurement.orientation)
 
             def predict(q: Floats) -> Floats:
@@ -128,13 +141,18 @@ class Sensors:
 
             values = np.concatenate([place, np.zeros(3)])
             std = np.concatenate([std, np.full(3, settings.orientation_deviation)])
-            return self.own(values, _covariance(given, std), predict)
+            return self.own(values, _covariance(given, std), predict, name="tip(q)")
         points: Any = self._with("points", "on_points")
         rows = np.atleast_1d(np.asarray(measurement.pixels, dtype=object))
         shape = min(max(len(rows), 1), MOST_VALUES // 2), 2
         found = check_numbers("pixels", measurement.pixels, shape).ravel()
         covariance = _covariance(given, np.full(found.size, settings.point_deviation))
-        return self.own(found, covariance, lambda q: np.ravel(points.points(q)), point=2)
+        name = "points(q)"
+
+        def pixels(q: Floats) -> Floats:
+            return check_result(name, points.points(q), shape).ravel()
+
+        return self.own(found, covariance, pixels, point=2, name=name)
 
     def own(
         self,
@@ -142,31 +160,38 @@ class Sensors:
         covariance: Floats,
         predict: Predict,
         jacobian: Predict | None = None,
+        *,
         point: int = 1,
+        name: str = "predict(q)",
     ) -> Reading:
         """Reading of values (m,) by a model of the user's, with its Jacobian or by differences."""
 
         def checked(q: Floats) -> Floats:
-            return _shaped("predict(q)", predict(q), values.shape)
+            return check_result(name, predict(q), values.shape)
 
         steps = STEP * self._widths
         derive = jacobian or partial(jacobian_by_differences, checked, steps=steps)
+        calls = 1 if jacobian else 1 + 2 * self._count
+        times: list[float] = []
 
         def model(q: Floats) -> tuple[Floats, Floats]:
-            rows = _shaped("jacobian(q)", derive(q), (len(values), len(q)))
-            return checked(q), rows
+            begin = perf_counter()
+            rows = check_result("jacobian(q)", derive(q), (len(values), len(q)))
+            found = checked(q)
+            times.append(perf_counter() - begin)
+            return found, rows
 
-        return Reading(values, covariance, model, checked, point)
+        return Reading(values, covariance, model, checked, point, name, calls, times)
 
     @cached_property
     def _with_tip(self) -> Kinematics:
         kinematics = self._with("tip", "on_pose")
-        own = kinematics.own if isinstance(kinematics, Placed) else kinematics
-        found: object = own.tip(np.array([sum(dof.travel) / 2 for dof in self._config.dof]))
-        shapes = [np.shape(part) for part in found] if isinstance(found, tuple | list) else None
-        if shapes != [(3,), (3, 3)]:
+        try:
+            kinematics.tip(np.array([sum(dof.travel) / 2 for dof in self._config.dof]))
+        except SignalError as error:
             allowed = "a class whose tip(q) returns a position (3,) and a rotation matrix (3, 3)"
-            raise ConfigError("kinematics.kind", self._config.kinematics.kind, allowed)
+            kind = self._config.kinematics.kind
+            raise ConfigError("kinematics.kind", kind, f"{allowed} ({error})") from None
         return kinematics
 
     def _with(self, method: str, call: str) -> Kinematics:
@@ -197,13 +222,6 @@ def check_rotation(orientation: ArrayLike) -> Floats:
     ):
         return found
     raise SignalError("orientation", found.tolist(), allowed)
-
-
-def _shaped(field: str, found: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    array = np.asarray(found, dtype=np.float64)
-    if array.shape != shape:
-        raise SignalError(field, f"an array {array.shape}", f"an array {shape}")
-    return array
 
 
 def _covariance(covariance: ArrayLike | None, std: NDArray[np.float64]) -> Floats:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from tautscope.loop.vision import Detection, MarkerDetector
 
 Method = TypeVar("Method", bound=Callable[..., Any])
+Result = TypeVar("Result")
 Triggers = tuple[str | None, str | None]
 LIMITED = "limited by actuators.limits"
 """After the name of a degree of freedom in `Report.warnings`."""
@@ -166,9 +167,18 @@ def _exclusive(call: Method) -> Method:
     @wraps(call)
     def wait(loop: HysteresisReduction, /, *arguments: Any, **keys: Any) -> Any:
         with loop._lock:
+            if loop._is_calling:
+                where = "a call in predict, jacobian, tip, points or actuators.map"
+                raise SignalError(call.__name__, where, "a call outside of them")
             return call(loop, *arguments, **keys)
 
     return cast(Method, wait)
+
+
+def _captured_at(frame: Frame) -> float:
+    if not isinstance(frame, Frame):
+        raise SignalError("frame", type(frame).__name__, "a tautscope.Frame")
+    return check_time("captured_at", frame.captured_at)
 
 
 class HysteresisReduction:
@@ -191,7 +201,7 @@ class HysteresisReduction:
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = check_config(config)
-        self._lock = RLock()
+        self._lock, self._is_calling = RLock(), False
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
@@ -253,14 +263,14 @@ class HysteresisReduction:
             self._log_warnings(time, now)
             self._log_interval(time)
         limit = None if self._actuators is None else self._within_limits
-        return self._loop.step(values, time, made_at, limit)
+        return self._calling(self._loop.step, values, time, made_at, limit)
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state and the offsets, Eqs. (4)-(16).
 
         Raises:
             FrameError: The image is not what the configured camera gives.
-            SignalError: The capture time is not finite.
+            SignalError: It is no `Frame`, or its capture time not finite.
         """
         return self.on_detection(frame, self._detection(frame)())
 
@@ -272,7 +282,7 @@ class HysteresisReduction:
         copy of a buffer that the camera reuses.
 
         Raises:
-            SignalError: The capture time is not finite.
+            SignalError: As `on_frame`.
         """
         detect = self._detection(frame)
         self._notify(f"prepare_detection {frame.sequence}")
@@ -280,7 +290,7 @@ class HysteresisReduction:
 
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """Second part of `on_frame`: the update with the result of `prepare_detection`."""
-        captured_at = check_time("captured_at", frame.captured_at)
+        captured_at = _captured_at(frame)
         found = any(detection.found)
         features, covariance = (detection.features, detection.covariance) if found else (None, None)
         return self._update(features, covariance, captured_at, detection, checksum(frame.image))
@@ -389,9 +399,14 @@ class HysteresisReduction:
             sensor: Which of 4 sensors, each with its own rate and delay.
 
         Raises:
-            SignalError: As `on_tip`; a result of `predict` or `jacobian` has another shape.
+            SignalError: As `on_tip`; `predict` or `jacobian` is no function, or a result of it has
+                another shape.
         """
         sensors = self._axes_sensors("on_measurement")
+        derived = predict if jacobian is None else jacobian
+        for name, given in (("predict", predict), ("jacobian", derived)):
+            if not callable(given):
+                raise SignalError(name, given, "a function of q (n,)")
         found = check_values(values)
         known = check_covariance("covariance", covariance, len(found))
         reading = sensors.own(found, known, predict, jacobian)
@@ -538,7 +553,7 @@ class HysteresisReduction:
 
     def _detection(self, frame: Frame) -> Callable[[], Detection]:
         self._band_loop("on_frame")
-        prediction = self.predict_state(check_time("captured_at", frame.captured_at))
+        prediction = self.predict_state(_captured_at(frame))
         return partial(self._detector.detect, frame.image, None, prediction)
 
     def _band_loop(self, call: str) -> _core.Reduction:
@@ -560,8 +575,18 @@ class HysteresisReduction:
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
         known = reading.values, reading.covariance
-        result = self._loop.on_reading(*known, captured_at, reading.model, reading.point, sensor)
+        given = *known, captured_at, reading.model, reading.point, sensor
+        result = self._calling(self._loop.on_reading, *given)
+        self._log_slow(reading, captured_at)
         return self._report(result, captured_at)
+
+    def _calling(self, call: Callable[..., Result], *arguments: Any) -> Result:
+        """Result of a call that calls functions of the user's, which cannot use the loop."""
+        try:
+            self._is_calling = True
+            return call(*arguments)
+        finally:
+            self._is_calling = False
 
     def _within_limits(self, last: Floats, command: Floats) -> Floats:
         assert self._actuators is not None
@@ -601,6 +626,17 @@ class HysteresisReduction:
             what = "control ticks come every %.4g s: set control.period to it. With %g s limits "
             what += "of speed are wrong by the ratio, and later ticks may move nothing"
             self._log_once("interval", what, interval, period)
+
+    def _log_slow(self, reading: Reading, time: float) -> None:
+        # The flags of late ticks blame other programs. These make some calls longer, not the least.
+        took = len(reading.times) * min(reading.times, default=0.0)
+        period, name = self._config.control.period, reading.name
+        if took > period:
+            what = "at %.3f s: an update takes %.2g s, with %d calls of %s, and step waits for it. "
+            what += "More than control.period = %g s makes ticks late: make %s faster, give "
+            what += "on_measurement a jacobian, or use a longer period"
+            calls = reading.calls * len(reading.times)
+            self._log_once(name, what, time, took, calls, name, period, name)
 
     def _log_once(self, key: str, text: str, *values: object) -> None:
         if key not in self._logged:

@@ -72,6 +72,17 @@ def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.fl
     return array
 
 
+def check_result(field: str, found: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """A copy of what a function of the user's returned, which may reuse its array.
+
+    If it has another shape or is no numbers, a `SignalError` names `field`.
+    """
+    array = as_numbers(field, found, f"an array {shape}")
+    if array.shape != shape:
+        raise SignalError(field, f"an array {array.shape}", f"an array {shape}")
+    return array.copy()
+
+
 def as_floats(values: ArrayLike) -> NDArray[np.float64]:
     """Numbers as an array; those that are masked are NaN."""
     if isinstance(values, np.ma.MaskedArray):

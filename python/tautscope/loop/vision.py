@@ -193,7 +193,8 @@ class MarkerDetector:
 
         Raises:
             FrameError: The image is not what the configured camera gives.
-            SignalError: The prediction is not four numbers.
+            SignalError: The predicted features are not four numbers, or the expectation is no
+                `StatePrediction` of three.
         """
         prior = self._prior(predicted_features, expectation)
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
@@ -214,8 +215,7 @@ class MarkerDetector:
             if predicted.shape != (4,):
                 raise SignalError("predicted_features", predicted_features, allowed)
         if expectation is not None:
-            known = (expectation.state, expectation.std, expectation.geometry)
-            return tuple(map(np.asarray, known))
+            return tuple(_prior_part(expectation, name) for name in ("state", "std", "geometry"))
         if not np.isfinite(predicted).all():
             return None
         starts, broad = self._starts
@@ -235,8 +235,14 @@ class MarkerDetector:
 
         Raises:
             FrameError: As `detect`.
+            SignalError: A window is not four whole numbers.
         """
-        regions = self._core.regions_in(self._layout.checked(image), windows)
+        allowed = "windows of four whole numbers: left, top, right, bottom [px]"
+        found = as_numbers("windows", windows, allowed)
+        if found.size and (found.shape[1:] != (4,) or (found != np.floor(found)).any()):
+            raise SignalError("windows", found.tolist(), allowed)
+        inside = found.reshape(-1, 4).clip(0, max(self._layout.shape)).astype(int).tolist()
+        regions = self._core.regions_in(self._layout.checked(image), inside)
         return tuple(map(Region._make, regions))
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -246,6 +252,16 @@ class MarkerDetector:
             FrameError: As `detect`.
         """
         return self._core.mask(self._layout.checked(image))
+
+
+def _prior_part(expectation: StatePrediction, name: str) -> NDArray[np.float64]:
+    if not isinstance(expectation, StatePrediction):
+        raise SignalError("expectation", type(expectation).__name__, "a StatePrediction")
+    field, allowed = f"expectation.{name}", "3 numbers"
+    found = as_numbers(field, getattr(expectation, name), allowed)
+    if found.shape != (3,):
+        raise SignalError(field, found.tolist(), allowed)
+    return found
 
 
 def workspace_starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -139,8 +139,8 @@ def period_widths(
     time: ArrayLike, x: ArrayLike, y: ArrayLike, *, start: float, period: float, periods: int
 ) -> Floats:
     """(periods,) mean loop width of each whole period of y over x from time `start`."""
-    time = np.asarray(time, dtype=np.float64)
     x, y = _pair("x", x, "y", y)
+    x, time = _pair("x", x, "time", time)
     edges = np.searchsorted(time, start + period * np.arange(periods + 1))
     # One sample more than the period closes the loop.
     windows = (slice(first, last + 1) for first, last in pairwise(edges))
@@ -173,8 +173,9 @@ def creep(references: ArrayLike, tip: ArrayLike) -> float:
     NaN if none does.
     """
     desired, actual = np.asarray(references, dtype=np.float64), np.asarray(tip, dtype=np.float64)
-    if desired.ndim != 2 or desired.shape[0] != actual.shape[0]:
-        raise SignalError("references", desired.shape, f"one row for each of {len(actual)} samples")
+    if desired.ndim != 2 or desired.shape[:1] != actual.shape:
+        allowed = f"a row (3,) for each sample of a tip (n,), here of shape {actual.shape}"
+        raise SignalError("references", f"an array of shape {desired.shape}", allowed)
     rests = np.all(np.diff(desired, axis=0) == 0, axis=1)
     steps = np.abs(np.diff(actual))[rests]
     known = steps[np.isfinite(steps)]
@@ -189,7 +190,8 @@ def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
 def tip_overspeed(time: ArrayLike, reference: ArrayLike, tip: ArrayLike) -> float:
     """99.9th percentile of |tip speed| over the peak of |reference speed|; 1 is ideal."""
     reference, tip = _pair("reference", reference, "tip", tip)
-    steps = np.diff(np.asarray(time, dtype=np.float64))
+    reference, time = _pair("reference", reference, "time", time)
+    steps = np.diff(time)
     if len(steps) == 0 or not np.all(steps > 0):
         return np.nan
     peak = np.max(np.abs(np.diff(reference)) / steps)
@@ -281,7 +283,11 @@ def marker_errors(measured: ArrayLike, truth: ArrayLike) -> Floats:
         measured: (n, 4) measured features, x and y of A, then of B [px].
         truth: (n, 4) true features.
     """
-    difference = np.asarray(measured, np.float64) - np.asarray(truth, np.float64)
+    found, true = np.asarray(measured, np.float64), np.asarray(truth, np.float64)
+    for name, each in (("measured", found), ("truth", true)):
+        if each.shape != (*found.shape[:1], 4):
+            raise SignalError(name, f"an array of shape {each.shape}", "arrays (n, 4) of one n")
+    difference = found - true
     return np.asarray(np.hypot(difference[:, 0::2], difference[:, 1::2]))
 
 

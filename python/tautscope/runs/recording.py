@@ -115,9 +115,12 @@ class Recording:
         """RMS of the tip less the reference (n,) [m or rad] from `after` [s] on.
 
         The tip is the true one, or the estimate where the rig does not know it; NaN before the
-        first measurement.
+        first measurement, and for a run that ends before `after`.
         """
-        rms: Floats = np.sqrt(np.mean(self.tracking_error(after) ** 2, axis=0))
+        error = self.tracking_error(after)
+        if not len(error):
+            return np.full(error.shape[1], np.nan)
+        rms: Floats = np.sqrt(np.mean(error**2, axis=0))
         return rms
 
     def tracking_error(self, after: float = 20.0) -> Floats:
