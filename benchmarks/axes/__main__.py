@@ -100,6 +100,8 @@ def main() -> None:
     parser.add_argument("--start", action="store_true", help="the first 40 s of 60 drawn plays")
     parser.add_argument("--faults", action="store_true", help="of the sensor, with 40 seeds each")
     options = parser.parse_args()
+    if options.write and options.dofs:
+        parser.error("--write updates whole tables: use it without --dofs")
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     if options.colonoscope:
         both = [(what, seed) for seed in seeds for what in ("motion", "delay")]

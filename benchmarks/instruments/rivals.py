@@ -20,11 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from common.doc_pages import insert
 from common.paths import ROOT
-from common.processes import add_arguments, run_parallel
+from common.processes import add_arguments, run_until_stopped
 from common.rows import goal_row
 from instruments.rival_runs import NAMES, Name, RivalFigures, RivalRun, Triple, simulate
 from numpy.typing import NDArray
-from tautscope.commands.printing import progress_bar
 from tautscope.dof import Dof
 
 Floats = NDArray[np.float64]
@@ -50,7 +49,7 @@ SERVOING: dict[float, Triple] = {
 FREE_GAIN: Triple = (5.0, 5.0, 20.0)
 """Free gains of constant compensation: the best median reduction of `--tune`."""
 
-Results = Mapping[RivalRun, RivalFigures]
+Found = Mapping[RivalRun, RivalFigures]
 
 
 def gains_of(name: Name, latency: float) -> Triple:
@@ -80,7 +79,7 @@ def _normal(run: RivalRun) -> RivalRun:
 
 
 def values(
-    found: Results, name: Name, quantity: str, latency: float, loss: float
+    found: Found, name: Name, quantity: str, latency: float, loss: float
 ) -> dict[int, list[float]]:
     """Values per seed of a controller in a cell; what has no images has one for all cells."""
     return {
@@ -94,7 +93,7 @@ def values(
     }
 
 
-def reductions(found: Results, name: Name, latency: float, loss: float) -> Floats:
+def reductions(found: Found, name: Name, latency: float, loss: float) -> Floats:
     """(seeds, 3) reductions of the spread against the runs without compensation."""
     free = values(found, "none", "spread", latency, loss)
     own = values(found, name, "spread", latency, loss)
@@ -103,14 +102,14 @@ def reductions(found: Results, name: Name, latency: float, loss: float) -> Float
     return np.array(rows).reshape(-1, 3)
 
 
-def creeps(found: Results, name: Name, latency: float, loss: float) -> Floats:
+def creeps(found: Found, name: Name, latency: float, loss: float) -> Floats:
     """(seeds, 3) travels of the tip while every reference rests."""
     own = values(found, name, "creep", latency, loss)
     return np.array([own[seed] for seed in sorted(own)]).reshape(-1, 3)
 
 
 def to_rows(
-    found: Results, latencies: Sequence[float], losses: Sequence[float]
+    found: Found, latencies: Sequence[float], losses: Sequence[float]
 ) -> list[dict[str, Any]]:
     """Rows per cell, rival and DOF: by how much `best` is ahead in the median."""
     rows = []
@@ -141,7 +140,7 @@ def to_rows(
     return rows
 
 
-def table(found: Results, latencies: Sequence[float], losses: Sequence[float]) -> str:
+def table(found: Found, latencies: Sequence[float], losses: Sequence[float]) -> str:
     """Return a Markdown table: per cell the median reductions, and the median travels at rest."""
     lines = [
         "| latency | loss | quantity | best | visual servoing | constant compensation | none |",
@@ -174,7 +173,7 @@ def tuning_table(options: argparse.Namespace) -> str:
         for name, latency, gains in kinds
         for seed in TUNING_SEEDS
     ]
-    found = measure(runs, options)
+    found = run_until_stopped(simulate, runs, options, "rivals")
     lines = ["| controller | latency | gain | reduction |", "|---|--:|--:|--:|"]
     for name, latency, gains in kinds[1:]:
         own = {
@@ -189,19 +188,6 @@ def tuning_table(options: argparse.Namespace) -> str:
     return "\n".join(lines)
 
 
-def measure(runs: Sequence[RivalRun], options: argparse.Namespace) -> dict[RivalRun, RivalFigures]:
-    """Simulate; Ctrl-C ends with the runs that are finished."""
-    found: dict[RivalRun, RivalFigures] = {}
-    with progress_bar("rivals") as show_progress:
-        try:
-            for run, figures in run_parallel(simulate, runs, options.workers, options.scheduler):
-                found[run] = figures
-                show_progress(len(found) / len(runs))
-        except KeyboardInterrupt:
-            pass
-    return found
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--instruments", type=int, default=INSTRUMENTS, help="[%(default)s]")
@@ -214,18 +200,22 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
     options = parser.parse_args()
+    if options.write and (options.latency or options.loss or options.tune):
+        parser.error("--write updates the whole table: use it without --latency, --loss and --tune")
     if options.tune:
         print(tuning_table(options))
         return
     cells = options.latency or LATENCIES, options.loss or LOSSES
     seeds = range(options.first_seed, options.first_seed + options.instruments)
-    found = measure(plan(seeds, *cells, options.duration), options)
+    runs = plan(seeds, *cells, options.duration)
+    found = run_until_stopped(simulate, runs, options, "rivals")
     shown = table(found, *cells)
     if options.json:
         rows = to_rows(found, *cells)
         print(json.dumps({"rows": rows, "seeds": list(seeds), "table": shown}))
     else:
         print(shown)
+    found.require_all()
     if options.write:
         text = f"Seeds {seeds[0]} to {seeds[-1]}, true features with noise.\n\n{shown}"
         insert(PAGE, "rivals", text)
