@@ -1,15 +1,19 @@
 """What all campaigns share: Ctrl-C, and the pages that `--write` updates."""
 
 import importlib
+import json
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from axes import sensor_faults
 from common import doc_pages, processes
 from common.processes import Results, run_until_stopped
+from records import compensator, honest, loop, verdicts
 
 CAMPAIGNS = {
     "soak.__main__": ["--plant", "plays"],
@@ -112,3 +116,53 @@ def test_a_page_is_replaced_whole_or_not_at_all(
         doc_pages.insert(page, "t", "newer")
     assert page.read_text(encoding="utf-8") == after
     assert list(tmp_path.iterdir()) == [page]
+
+
+AS_JSON = {
+    "axes.__main__": ["--colonoscope --seeds 1", "--start --first-seed 3", "--faults"],
+    "records.__main__": ["--only honest", "--only verdicts", "--only compensator"],
+}
+OUTCOMES = {
+    "--start": [1.0, 2.0, 3.0],
+    "--faults": sensor_faults.Outcome(0.1, 0.2),
+    "--colonoscope": [0.9, 0.8, 0.7],
+    "--only honest": honest.Outcome(4.0, (4.0, 3.9, 4.1), "slack"),
+    "--only verdicts": verdicts.Answer("slack", "4 mm", "text"),
+    "--only compensator": [compensator.Reduction("half", 0.8, 0.7)],
+}
+
+
+@pytest.mark.parametrize(("name", "given"), [(n, given) for n in AS_JSON for given in AS_JSON[n]])
+def test_json_has_the_outcome_of_every_job(
+    name: str, given: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    campaign = importlib.import_module(name)
+    (outcome,) = (each for key, each in OUTCOMES.items() if given.startswith(key))
+    ran: list[object] = []
+
+    def run(function: object, jobs: Any, *_: object) -> Iterator[tuple[Any, Any]]:
+        ran.extend(jobs)
+        return ((job, outcome) for job in ran)
+
+    monkeypatch.setattr(campaign, "run_parallel", run)
+    monkeypatch.setattr(loop, "records", lambda: ["tool"])
+    monkeypatch.setattr(verdicts, "names", lambda: ["tool"])
+    monkeypatch.setattr(sys, "argv", [name, *given.split(), "--json"])
+    campaign.main()
+    printed = json.loads(capsys.readouterr().out)["outcomes"]
+    if name.startswith("records"):
+        printed = printed[given.rsplit(maxsplit=1)[-1]]
+    assert len(printed) == len(ran) > 0
+    plain = json.loads(json.dumps(outcome, default=asdict))
+    assert all(each["outcome"] == plain for each in printed)
+
+
+def test_what_has_no_rows_is_not_for_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    campaign = importlib.import_module("records.__main__")
+    monkeypatch.setattr(sys, "argv", ["records", "--only", "episodes", "--json"])
+    monkeypatch.setattr(campaign.lerobot, "measure", lambda: pytest.fail("measured"))
+    with pytest.raises(SystemExit):
+        campaign.main()
+    assert "--json has no rows" in capsys.readouterr().err
