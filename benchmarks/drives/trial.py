@@ -136,7 +136,9 @@ def trial(
             happens(found)
         timeout = WATCHED if happens is not None else seconds + WATCHED
         found.said = [first or _said(pipe, timeout), _said(second, 0.0)]
-        time.sleep(max(0.0, found.happened + WATCHED / 2 - time.monotonic()))
+        # Twice the timeout, to tell a watchdog that is late from one that never stops its motor.
+        watched = max(WATCHED / 2, 2 * motors.heartbeat_timeout)
+        time.sleep(max(0.0, found.happened + watched - time.monotonic()))
     return found
 
 

@@ -46,7 +46,8 @@ SERVOING: dict[float, Triple] = {
     0.25: (3.0, 3.0, 3.0),
 }
 """Rates of visual servoing per latency [1/s]: the best median reductions of `--tune` among rates
-with which no instrument is worse than without compensation, but for 0.08 and 0.25 s, see the page."""
+with which no instrument is worse than without compensation; not those at 0.08 and 0.25 s, see the
+page."""
 FREE_GAIN: Triple = (5.0, 5.0, 20.0)
 """Free gains of constant compensation: the best median reduction of `--tune`."""
 
