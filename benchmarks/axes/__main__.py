@@ -7,7 +7,7 @@ times per second, 50 ms late. `--write` updates docs/plants.md.
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from axes.tracking import PLANTS, Job, bound, simulate, times
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
+from common.rows import outcome_rows
 
 FIRST_SEED, SEEDS = 400, 5
 COUNTS = (1, 2, 5, 8)
@@ -86,6 +87,11 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def show(options: argparse.Namespace, found: Mapping[Any, Any], text: str) -> None:
+    """Print the table, or the outcome of each job as one JSON object."""
+    print(json.dumps({"outcomes": outcome_rows(found)}) if options.json else text)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="axes", description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [5]")
@@ -100,14 +106,17 @@ def main() -> None:
     parser.add_argument("--start", action="store_true", help="the first 40 s of 60 drawn plays")
     parser.add_argument("--faults", action="store_true", help="of the sensor, with 40 seeds each")
     options = parser.parse_args()
+    if options.write and options.dofs:
+        parser.error("--write updates whole tables: use it without --dofs")
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     if options.colonoscope:
         both = [(what, seed) for seed in seeds for what in ("motion", "delay")]
         ran = dict(run_parallel(colonoscope.simulate, both, options.workers, options.scheduler))
-        text = colonoscope_table({job: ran[job] for job in both})
+        ran = {job: ran[job] for job in both}
+        text = colonoscope_table(ran)
         if options.write:
             insert(ROOT / "docs" / "plants.md", "colonoscope", text)
-        print(text)
+        show(options, ran, text)
         return
     if options.start:
         drawn = range(options.first_seed, options.first_seed + start.DRAWS)
@@ -118,11 +127,12 @@ def main() -> None:
             for seed in drawn
         ]
         spread = dict(run_parallel(start.simulate, wanted, options.workers, options.scheduler))
-        text = start.table({job: spread[job] for job in wanted})
+        spread = {job: spread[job] for job in wanted}
+        text = start.table(spread)
         if options.write:
             head = f"Seeds {drawn[0]} to {drawn[-1]}; median, 10th percentile.\n\n"
             insert(ROOT / "docs" / "plants.md", "start", head + text)
-        print(text)
+        show(options, spread, text)
         return
     if options.faults:
         drawn = range(options.first_seed, options.first_seed + sensor_faults.SEEDS)
@@ -135,10 +145,11 @@ def main() -> None:
         moved = dict(
             run_parallel(sensor_faults.simulate, faults, options.workers, options.scheduler)
         )
-        text = sensor_faults.table({job: moved[job] for job in faults})
+        moved = {job: moved[job] for job in faults}
+        text = sensor_faults.table(moved)
         if options.write:
             insert(ROOT / "docs" / "faults.md", "sensors", text)
-        print(text)
+        show(options, moved, text)
         return
     counts = [options.dofs] if options.dofs else COUNTS
     jobs = [(count, plant, seed) for count in counts for plant in PLANTS for seed in seeds]

@@ -16,10 +16,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from calibration.evaluation import Job, Outcome, evaluate
 from calibration.records import INSTRUMENTS, Case
 from calibration.tables import alarm_table, error_table, loop_table
-from common.doc_pages import insert
+from common.doc_pages import find, insert
 from common.paths import ROOT
-from common.processes import add_arguments, run_parallel
-from tautscope.commands.printing import progress_bar
+from common.processes import Results, add_arguments, run_until_stopped
 
 PAGE = ROOT / "docs" / "calibration.md"
 
@@ -40,10 +39,21 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", metavar="NAME", help=f"update this part of {PAGE.name}")
     add_arguments(parser)
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.write:
+        if options.images or options.band_distance or options.instrument != "nominal":
+            parser.error(
+                "--write updates the table of nominal twins with features: use it without "
+                "--images, --band-distance and --instrument"
+            )
+        try:
+            find(PAGE, options.write)
+        except ValueError as error:
+            parser.error(f"--write {options.write}: {error}")
+    return options
 
 
-def measure(options: argparse.Namespace) -> dict[int, Outcome]:
+def measure(options: argparse.Namespace) -> Results[Job, Outcome]:
     """Calibrate every twin; Ctrl-C ends with those that are finished."""
     seeds = range(options.first_seed, options.first_seed + options.twins)
     jobs = [
@@ -55,15 +65,7 @@ def measure(options: argparse.Namespace) -> dict[int, Outcome]:
         )
         for index, seed in enumerate(seeds)
     ]
-    found: dict[int, Outcome] = {}
-    with progress_bar("calibrations") as show_progress:
-        try:
-            for job, outcome in run_parallel(evaluate, jobs, options.workers, options.scheduler):
-                found[job.case.seed] = outcome
-                show_progress(len(found) / len(jobs))
-        except KeyboardInterrupt:
-            pass
-    return dict(sorted(found.items()))
+    return run_until_stopped(evaluate, jobs, options, "calibrations")
 
 
 def report(options: argparse.Namespace, found: dict[int, Outcome]) -> str:
@@ -82,9 +84,8 @@ def report(options: argparse.Namespace, found: dict[int, Outcome]) -> str:
 
 def main() -> None:
     options = arguments()
-    found = measure(options)
-    if not found:
-        raise SystemExit("No calibration is finished.")
+    done = measure(options)
+    found = {job.case.seed: outcome for job, outcome in done.items()}
     text = report(options, found)
     if options.json:
         print(json.dumps({seed: asdict(outcome) for seed, outcome in found.items()}))
@@ -93,6 +94,7 @@ def main() -> None:
             shown = {name: round(value, 2) for name, value in outcome.errors.items()}
             print(seed, "" if outcome.is_plausible else "NOT PLAUSIBLE", shown, *outcome.warnings)
         print(text)
+    done.require_all()
     if options.write:
         insert(PAGE, options.write, text)
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calibration.evaluation import Outcome, column
+from instruments.rows import STOPPED
 from tautscope.dof import Dof
 
 LOW = 0.9
@@ -39,7 +40,10 @@ def _low_coverages(outcomes: Sequence[Outcome]) -> str:
 
 
 def loop_table(outcomes: Sequence[Outcome]) -> str:
-    """State error and tracking error of the loop by what it is told."""
+    """State error and tracking error of the loop by what it is told.
+
+    A run that ended early counts as a reduction of -100 %; it has no state error.
+    """
     lines = [
         "| DOF | state error, calibrated over exact: median (worst) | told over exact | reduction "
         "of the tracking RMS, calibrated | exact | told | loss in points: median (worst) |",
@@ -50,16 +54,16 @@ def loop_table(outcomes: Sequence[Outcome]) -> str:
         ratio = column(outcomes, "state", "calibrated", dof) / exact
         before = column(outcomes, "state", "told", dof) / exact
         plain = column(outcomes, "hand", "none", dof)
-        left = {
-            name: 100 * (1 - column(outcomes, "hand", name, dof) / plain)
-            for name in ("calibrated", "exact", "told")
-        }
+        left = {}
+        for name in ("calibrated", "exact", "told"):
+            share = 1 - column(outcomes, "hand", name, dof) / plain
+            left[name] = 100 * np.where(np.isnan(share), STOPPED, share)
         loss = left["exact"] - left["calibrated"]
         lines.append(
             f"| {dof.label} | {np.nanmedian(ratio):.2f} ({np.nanmax(ratio):.2f}) | "
-            f"{np.nanmedian(before):.2f} | {np.nanmedian(left['calibrated']):.0f} % | "
-            f"{np.nanmedian(left['exact']):.0f} % | {np.nanmedian(left['told']):.0f} % | "
-            f"{np.nanmedian(loss):.1f} ({np.nanmax(loss):.1f}) |"
+            f"{np.nanmedian(before):.2f} | {np.median(left['calibrated']):.0f} % | "
+            f"{np.median(left['exact']):.0f} % | {np.median(left['told']):.0f} % | "
+            f"{np.median(loss):.1f} ({np.max(loss):.1f}) |"
         )
     return "\n".join(lines)
 

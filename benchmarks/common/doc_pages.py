@@ -1,18 +1,36 @@
 """Replacement of the generated sections of documentation pages."""
 
+import os
 import re
 from pathlib import Path
 
 
-def insert(page: Path, name: str, text: str) -> None:
-    """Replace the text between the markers ``<!-- name: begin -->`` and ``<!-- name: end -->``.
+def find(page: Path, name: str) -> re.Match[str]:
+    """Find the text between the markers ``<!-- name: begin -->`` and ``<!-- name: end -->``.
 
     Raises:
         ValueError: The page does not contain each marker once, in this order.
     """
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
-    old = page.read_text(encoding="utf-8")
-    if len(pattern.findall(old)) != 1:
+    pattern = f"(?<={re.escape(begin)}).*?(?={re.escape(end)})"
+    found = list(re.finditer(pattern, page.read_text(encoding="utf-8"), re.DOTALL))
+    if len(found) != 1:
         raise ValueError(f"{page} must contain {begin} and {end} once each")
-    page.write_text(pattern.sub(lambda _: f"{begin}\n{text}\n{end}", old), encoding="utf-8")
+    return found[0]
+
+
+def insert(page: Path, name: str, text: str) -> None:
+    """Replace the text between the markers; after an error the page is as before.
+
+    Raises:
+        ValueError: The page does not contain each marker once, in this order.
+        OSError: It cannot be written.
+    """
+    old = find(page, name)
+    partial = page.with_name(f".{page.name}.{os.getpid()}.partial")
+    try:
+        new = f"{old.string[: old.start()]}\n{text}\n{old.string[old.end() :]}"
+        partial.write_text(new, encoding="utf-8")
+        partial.replace(page)
+    finally:
+        partial.unlink(missing_ok=True)

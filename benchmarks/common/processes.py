@@ -4,9 +4,11 @@ import argparse
 import logging
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import TypeVar
+
+from tautscope.commands.printing import progress_bar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -21,6 +23,57 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="Dask scheduler that distributes the runs, as tcp://host:8786; local:N starts one "
         "with N workers on this computer [processes without Dask]",
     )
+
+
+class Results(dict[Job, Result]):
+    """Results of the finished jobs, in the order of all jobs.
+
+    Attributes:
+        missing: Number of jobs that Ctrl-C left unfinished.
+    """
+
+    missing = 0
+
+    def require_all(self) -> None:
+        """End the program after Ctrl-C: pages state the conditions of a whole campaign.
+
+        Raises:
+            SystemExit: A job is not finished.
+        """
+        if self.missing:
+            total = len(self) + self.missing
+            raise SystemExit(f"Stopped after {len(self)} of {total} runs: no page is updated.")
+
+
+def run_until_stopped(
+    function: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    options: argparse.Namespace,
+    title: str,
+) -> Results[Job, Result]:
+    """Run jobs with a progress bar; Ctrl-C ends with those that are finished.
+
+    Args:
+        function: As for `run_parallel`.
+        jobs: As for `run_parallel`, hashable.
+        options: With those of `add_arguments`.
+        title: Of the progress bar.
+
+    Raises:
+        SystemExit: No job is finished.
+    """
+    found: dict[Job, Result] = {}
+    with progress_bar(title) as show_progress:
+        try:
+            for job, result in run_parallel(function, jobs, options.workers, options.scheduler):
+                found[job] = result
+                show_progress(len(found) / len(jobs))
+        except KeyboardInterrupt:
+            if not found:
+                raise SystemExit("Stopped before any run was finished.") from None
+    results = Results({job: found[job] for job in jobs if job in found})
+    results.missing = len(jobs) - len(found)
+    return results
 
 
 def run_parallel(

@@ -1,6 +1,6 @@
 """Rows of the output: one quantity with its goal."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
@@ -41,6 +41,11 @@ def goal_row(
         "sense": sense,
         "holds": bool(middle <= goal if sense == "max" else middle >= goal),
     }
+
+
+def outcome_rows(found: Mapping[Any, Any]) -> list[dict[str, Any]]:
+    """Return a row per job, for `json.dumps` with `default=asdict`."""
+    return [{"job": job, "outcome": outcome} for job, outcome in found.items()]
 
 
 def print_rows(rows: Sequence[dict[str, Any]]) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import run_parallel
-from conditions.backgrounds import KINDS
+from conditions.backgrounds import KINDS, require_frames
 from conditions.frames import CONDITIONS, Evaluation, Job, evaluate, render
 from conditions.rows import table, to_rows
 from tautscope.commands.printing import progress_bar
@@ -92,6 +92,7 @@ def main() -> None:
     )
     parser.add_argument("--montage", type=Path, metavar="FILE", help="only draw examples, to FILE")
     options = parser.parse_args()
+    require_frames(parser)
     if options.montage is not None:
         montage(options.montage, seed=0)
         return

@@ -1,5 +1,6 @@
 """Backgrounds of the condition benchmark: procedural mucosa, colon frames, crops of them."""
 
+import argparse
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -9,12 +10,20 @@ import numpy as np
 from common.paths import DATA
 from numpy.typing import NDArray
 
+FRAMES = DATA / "colon_frames"
 KINDS = ("procedural", "frames", "crops")
 """Kinds of background."""
 TUNING_FRAMES = 5
 """The first frames by name; they and their crops are for tuning, the others for the figures."""
 CROPS = 20
 """Number of random crops."""
+
+
+def require_frames(parser: argparse.ArgumentParser) -> None:
+    """End the program if there are no frames besides those for tuning."""
+    if len(list(FRAMES.glob("*.jpg"))) <= TUNING_FRAMES:
+        text = f"more than {TUNING_FRAMES} files {FRAMES}/*.jpg are needed"
+        parser.error(f"{text}. Set TAUTSCOPE_DATA to the folder of real data.")
 
 
 @cache
@@ -26,7 +35,7 @@ def write_backgrounds(kind: str, is_tuning: bool) -> tempfile.TemporaryDirectory
     """
     if kind == "procedural":
         return None
-    files = sorted((DATA / "colon_frames").glob("*.jpg"))
+    files = sorted(FRAMES.glob("*.jpg"))
     files = files[:TUNING_FRAMES] if is_tuning else files[TUNING_FRAMES:]
     images = [image for file in files if (image := cv2.imread(str(file))) is not None]
     if kind == "crops":

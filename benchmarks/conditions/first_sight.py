@@ -22,7 +22,7 @@ import numpy as np
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import run_parallel
-from conditions.backgrounds import KINDS
+from conditions.backgrounds import KINDS, require_frames
 from conditions.frames import (
     CONDITIONS,
     MAX_ERROR,
@@ -87,6 +87,7 @@ def main() -> None:
         "--write", action="store_true", help="update the table of docs/conditions.md"
     )
     options = parser.parse_args()
+    require_frames(parser)
     names = [name for name in CONDITIONS if not name.startswith("no instrument")]
     work = [
         Job(name, seed, kind, options.sequences)

@@ -89,7 +89,8 @@ def repeated(bench: Config, fault: Fault, repeats: int) -> dict[str, Any]:
     times = [
         one["at"] - each.happened for one, each in zip(ended, trials, strict=True) if "at" in one
     ]
-    stops = [stop for each in trials if (stop := each.stopped()) is not None]
+    stops = np.array([each.stopped() for each in trials])
+    has_stopped = np.isfinite(stops)
     return {
         "what": fault.what,
         "right": sum(fault.is_right(each, bench.drives.protocol) for each in trials),
@@ -101,7 +102,8 @@ def repeated(bench: Config, fault: Fault, repeats: int) -> dict[str, Any]:
         "moves_ms": 1e3 * max(each.moved()[1] for each in trials),
         "far": float(moved[:, 1].max()),
         "far_others": float(np.delete(moved, 1, axis=1).max()),
-        "stop_ms": 1e3 * max(stops) if stops else None,
+        "stop_ms": 1e3 * float(stops[has_stopped].max()) if has_stopped.any() else None,
+        "never": int((~has_stopped).any(axis=1).sum()) if fault.is_silent else 0,
     }
 
 
@@ -125,6 +127,8 @@ def tables(document: dict[str, Any]) -> Iterator[str]:
             error, stop = (
                 "" if row[key] is None else f"{row[key]:.0f} ms" for key in ("error_ms", "stop_ms")
             )
+            never = f"{row['never']} never" if row["never"] else ""
+            stop = ", ".join(filter(None, (stop, never)))
             yield (
                 f"| {row['what']} | {row['right']} of {row['of']} | {ends} | {error} "
                 f"| {row['moves_ms']:.0f} ms | {row['far']:.3f}, {row['far_others']:.3f} rad "

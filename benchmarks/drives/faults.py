@@ -17,6 +17,10 @@ PAUSE = 0.3
 SERVOS = frozenset({"dynamixel", "feetech"})
 ON_LINE = SERVOS | {"serial"}
 ALL = ON_LINE | {"canopen"}
+WITH_WATCHDOG = ALL - {"feetech"}
+STOP_MARGIN = 0.1
+"""Time beyond `heartbeat_timeout` in which a watchdog must stop a motor: its steps, a cycle, and
+delays of a computer that simulates it [s]."""
 UNKNOWN_ID = 8
 FOREIGN = 100
 """Set-points of another program."""
@@ -63,6 +67,7 @@ class Fault:
         names_motor: Whether the message must name the motor to which it happens.
         wrong_node: Whether the controller believes in another id of that motor.
         speaker: 0 if the controller must end, 1 if the other program must.
+        is_silent: Whether only their watchdogs can stop the motors.
     """
 
     what: str
@@ -71,20 +76,33 @@ class Fault:
     names_motor: bool = False
     wrong_node: bool = False
     speaker: int = 0
+    is_silent: bool = False
 
     def is_right(self, trial: Trial, protocol: str) -> bool:
         """Whether it ended as it must."""
         said, other = trial.said[self.speaker], trial.said[0]
         if self.speaker and other:
             return False  # the controller goes on
+        if self.is_silent and protocol in WITH_WATCHDOG:
+            limit = trial.config.heartbeat_timeout + STOP_MARGIN
+            if max(trial.stopped()) > limit:
+                return False
         named = not self.names_motor or trial.one.label in said.get("message", "")
         return said.get("error", "") in self.errors[protocol].split("|") and named
 
 
 FAULTS = (
-    Fault("controller killed", lambda t: t.signal(signal.SIGKILL), dict.fromkeys(ALL, "")),
     Fault(
-        "controller stopped for ever", lambda t: t.signal(signal.SIGSTOP), dict.fromkeys(ALL, "")
+        "controller killed",
+        lambda t: t.signal(signal.SIGKILL),
+        dict.fromkeys(ALL, ""),
+        is_silent=True,
+    ),
+    Fault(
+        "controller stopped for ever",
+        lambda t: t.signal(signal.SIGSTOP),
+        dict.fromkeys(ALL, ""),
+        is_silent=True,
     ),
     Fault(
         f"controller paused for {PAUSE:g} s",

@@ -94,10 +94,11 @@ class Trial:
         took = 0.0 if last is None else after[last][0] - self.happened
         return np.abs(where - before[-1]).max(axis=0), took
 
-    def stopped(self) -> float | None:
-        """When the last motor stopped [s after it happened], None if none did."""
-        times = [event.time for event in self.motors.events if event.what in STOPPED]
-        return max(times) - self.happened if times else None
+    def stopped(self) -> list[float]:
+        """When each motor stopped [s after it happened], infinite if it never did."""
+        events = self.motors.events
+        times = {event.dof: event.time - self.happened for event in events if event.what in STOPPED}
+        return [times.get(motor.label, math.inf) for motor in self.labels]
 
 
 def trial(
@@ -135,7 +136,9 @@ def trial(
             happens(found)
         timeout = WATCHED if happens is not None else seconds + WATCHED
         found.said = [first or _said(pipe, timeout), _said(second, 0.0)]
-        time.sleep(max(0.0, found.happened + WATCHED / 2 - time.monotonic()))
+        # Twice the timeout, to tell a watchdog that is late from one that never stops its motor.
+        watched = max(WATCHED / 2, 2 * motors.heartbeat_timeout)
+        time.sleep(max(0.0, found.happened + watched - time.monotonic()))
     return found
 
 

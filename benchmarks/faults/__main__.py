@@ -12,17 +12,20 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from common.doc_pages import insert
+from common.processes import Results
 from faults import tables
-from faults.campaign import PAGE, Options, arguments, measure, read
+from faults.campaign import PAGE, Options, arguments, measure, merge, read, section
 from faults.scenarios import DURATION
 
 
 def main() -> None:
     options = arguments()
-    found = read(options.read) if options.read else measure(options)
+    done = Results() if options.read else measure(options)
+    found = read(options.read) if options.read else merge(done.values())
     if options.json:
         options.json.write_text(json.dumps(found), encoding="utf-8")
     each_off = {name.removeprefix("-"): rows for name, rows in found.items() if name[:1] == "-"}
+    parts = {}
     for name, rows in found.items():
         if name[:1] == "-":
             continue
@@ -31,16 +34,16 @@ def main() -> None:
         goals = "" if name else f" {tables.goals(options.profile)}"
         text = f"{tables.summary(rows)}{goals}\n\n{shown}"
         print(f"{name or 'guarded'}: {text}\n")
-        if options.write:
-            title = f"faults {'long' if is_long else name or 'guarded'}"
-            insert(PAGE, title, f"{conditions(options, name)}\n\n{text}")
+        parts[section(options, name)] = f"{conditions(options, name)}\n\n{text}"
     if each_off:
         text = tables.off_table(each_off)
         print(text)
-        if options.write:
-            insert(PAGE, "faults each", f"{conditions(options, 'each')}\n\n{text}")
+        parts["faults each"] = f"{conditions(options, 'each')}\n\n{text}"
     if options.kind and options.seed is not None:
         print(json.dumps(next(iter(found.values())), indent=1))
+    done.require_all()
+    for title, text in parts.items() if options.write else ():
+        insert(PAGE, title, text)
 
 
 def conditions(options: Options, name: str) -> str:

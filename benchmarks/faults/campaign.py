@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
+from common.doc_pages import find
 from common.paths import ROOT
-from common.processes import add_arguments, run_parallel
+from common.processes import Results, add_arguments, run_until_stopped
 from faults import tables
 from faults.runs import run_seed, run_with_each_off
 from faults.scenarios import DURATION, OBSERVED_AFTER, OBSERVED_PERMANENT
-from tautscope.commands.printing import progress_bar
 from tautscope.config import Profile
 from tautscope.loop.safety import DETECTORS
 from tautscope.twin.faults import KINDS
@@ -68,10 +68,25 @@ def arguments() -> Options:
         parser.error("--longest: above 0.1, 6 at most")
     if options.off == "each" and options.longest != DURATION[1]:
         parser.error("--longest is not for --off each")
+    if options.write and not options.read:
+        if options.kind or options.seed is not None or options.shard != "1/1":
+            parser.error(
+                "--write updates whole tables: use it without --kind, --seed and --shard, or with "
+                "--read"
+            )
+        try:
+            find(PAGE, section(options, {"all": "unguarded"}.get(options.off, options.off)))
+        except ValueError as error:
+            parser.error(f"--write: {error}")
     return options
 
 
-def measure(options: Options) -> Found:
+def section(options: Options, name: str) -> str:
+    """Return the section of the page for the rows of what is off."""
+    return f"faults {'long' if options.longest != DURATION[1] else name or 'guarded'}"
+
+
+def measure(options: Options) -> Results[int, Found]:
     """Run a campaign; Ctrl-C ends it with the seeds that are finished."""
     runs = options.runs or (DETECTOR_RUNS if options.off == "each" else RUNS)
     seeds, kinds = select_seeds(options, runs), options.kind or list(KINDS)
@@ -83,16 +98,8 @@ def measure(options: Options) -> Found:
         longest=options.longest,
     )
     if len(seeds) == 1:
-        return simulate(seeds[0])
-    found: dict[int, Found] = {}
-    with progress_bar("faults") as show_progress:
-        try:
-            for seed, rows in run_parallel(simulate, seeds, options.workers, options.scheduler):
-                found[seed] = rows
-                show_progress(len(found) / len(seeds))
-        except KeyboardInterrupt:
-            pass
-    return merge(found[seed] for seed in seeds if seed in found)
+        return Results({seeds[0]: simulate(seeds[0])})
+    return run_until_stopped(simulate, seeds, options, "faults")
 
 
 def select_seeds(options: Options, runs: int) -> list[int]:

@@ -13,13 +13,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from common.doc_pages import insert
 from common.paths import ROOT
-from common.processes import add_arguments, run_parallel
+from common.processes import add_arguments, run_until_stopped
 from instruments.alarms import alarm_table
 from instruments.explanation import explain
 from instruments.properties import markdown_table
 from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
-from instruments.runs import VARIANTS, Figures, Run, simulate
-from tautscope.commands.printing import progress_bar
+from instruments.runs import VARIANTS, Run, simulate
 from tautscope.report.operator_motion import EVALUATED_AFTER
 
 MOTIONS = ("hand", "sines")
@@ -53,6 +52,12 @@ def arguments() -> argparse.Namespace:
     options = parser.parse_args()
     if options.duration <= EVALUATED_AFTER:
         parser.error(f"--duration {options.duration:g}: must be above {EVALUATED_AFTER:g} s")
+    is_whole = "hand" in (options.motion or MOTIONS) and not (options.features and options.variant)
+    if options.write and (options.seed is not None or not is_whole):
+        parser.error(
+            "--write updates whole tables: use it without --seed, not with --motion sines alone, "
+            "and with --features without --variant"
+        )
     return options
 
 
@@ -69,19 +74,6 @@ def plan(options: argparse.Namespace) -> list[Run]:
     return sorted(runs, key=lambda run: run.variant == "none")
 
 
-def measure(options: argparse.Namespace) -> dict[Run, Figures]:
-    """Simulate; Ctrl-C ends with the runs that are finished."""
-    runs, found = plan(options), {}
-    with progress_bar("instruments") as show_progress:
-        try:
-            for run, figures in run_parallel(simulate, runs, options.workers, options.scheduler):
-                found[run] = figures
-                show_progress(len(found) / len(runs))
-        except KeyboardInterrupt:
-            pass
-    return found
-
-
 def results(options: argparse.Namespace, rows: list[Row]) -> str:
     """Return the tables of all motions with their conditions, as Markdown."""
     seeds = [row["seed"] for row in rows]
@@ -95,7 +87,8 @@ def results(options: argparse.Namespace, rows: list[Row]) -> str:
 
 def main() -> None:
     options = arguments()
-    rows = seed_rows(measure(options))
+    found = run_until_stopped(simulate, plan(options), options, "instruments")
+    rows = seed_rows(found)
     if not rows:
         raise SystemExit("No instrument is finished.")
     text = results(options, rows)
@@ -104,6 +97,7 @@ def main() -> None:
         print(json.dumps({"rows": summary_rows(rows), **facts}))
     else:
         print(f"{seed_table(rows)}\n\n{text}\n\n{alarm_table(rows)}")
+    found.require_all()
     if options.write:
         if options.features and (alarms := alarm_table(rows)):
             insert(ALARMS, "alarms", alarms)

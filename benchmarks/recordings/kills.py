@@ -21,6 +21,8 @@ PERIOD = 0.01
 """Control period of the recording process [s]."""
 IMAGE_TICKS = 4
 """Control periods per image."""
+LOST_AT_MOST = 0.1
+"""Goal of the ticks lost at the end [s]."""
 _SENT = struct.Struct("<qd")
 """Number of recorded ticks, and the time of the last one [s]."""
 
@@ -42,6 +44,11 @@ class Loss:
     images: float
     holes: int
     is_readable: bool
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether the goal is missed."""
+        return not self.is_readable or self.holes > 0 or self.ticks > LOST_AT_MOST
 
 
 @dataclass(frozen=True)
@@ -89,9 +96,7 @@ def record_forever(log_file: Path, sent_file: Path, scene: Scene) -> None:
 
 def kill_one(folder: Path, lifetime: float, scene: Scene) -> Loss:
     """Start a recording, kill it `lifetime` after its first tick, and return what was lost."""
-    log_file, sent_file, repaired = (
-        folder / name for name in ("run.mcap", "sent", "repaired.mcap")
-    )
+    log_file, sent_file = folder / "run.mcap", folder / "sent"
     sent_file.write_bytes(bytes(_SENT.size))
     # A fork server with all modules loaded saves the imports in every process.
     context = get_context("forkserver")
@@ -109,31 +114,41 @@ def kill_one(folder: Path, lifetime: float, scene: Scene) -> Loss:
         child.kill()
         child.join()
     ticks, last = _SENT.unpack(sent_file.read_bytes())
-    recover(log_file, repaired)
-    log = read_log(repaired)
+    assert ticks > 0
+    return loss_of(log_file, last)
+
+
+def loss_of(log_file: Path, last: float) -> Loss:
+    """Return what a log lost that recorded until `last` [s]: all if it cannot be read."""
+    repaired = log_file.with_name("repaired.mcap")
+    try:
+        recover(log_file, repaired)
+        log = read_log(repaired)
+        _read_with_rosbags(repaired)
+    except Exception as error:  # also of rosbags, which has no common one
+        print(f"not readable: {error!r}", file=sys.stderr, flush=True)
+        return Loss(last, ticks=last, images=last, holes=0, is_readable=False)
     times = [event.sample.time for event in log.events.values() if isinstance(event, Tick)]
     image_times = [
         float(event.row[0])  # type: ignore[arg-type]
         for index, event in log.events.items()
         if isinstance(event, Update) and log.has_image(index)
     ]
-    assert ticks > 0
     return Loss(
         duration=last,
         ticks=last - max(times, default=0.0),
         images=max(last - max(image_times, default=0.0) - IMAGE_TICKS * PERIOD, 0.0),
         holes=log.missing,
-        is_readable=_rosbags_reads(repaired),
+        is_readable=True,
     )
 
 
-def _rosbags_reads(path: Path) -> bool:
+def _read_with_rosbags(path: Path) -> None:
     from rosbags.highlevel import AnyReader  # noqa: PLC0415
 
     with AnyReader([path]) as reader:
         for connection, _, data in reader.messages():
             reader.deserialize(data, connection.msgtype)
-    return True
 
 
 def kills(count: int) -> dict[str, object]:
@@ -150,6 +165,7 @@ def kills(count: int) -> dict[str, object]:
     return {
         "kills": count,
         "readable": sum(loss.is_readable for loss in losses),
+        "failed": sum(loss.is_failure for loss in losses),
         "with_holes": sum(loss.holes > 0 for loss in losses),
         "lost_median_s": round(float(np.median(lost)), 3),
         "lost_p99_s": round(float(np.quantile(lost, 0.99)), 3),

@@ -11,7 +11,8 @@ updates docs/models.md and docs/verdicts.md.
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
-from common.rows import goal_row
+from common.rows import goal_row, outcome_rows
 from records import compensator, honest, lerobot, loop, verdicts
 from records.evaluation import Job, Result, evaluate
 from records.families import FAMILIES
@@ -144,22 +145,25 @@ def measure_compensators(options: argparse.Namespace) -> dict[str, list[compensa
     return {name: done[name] for name in names}
 
 
-def judge_all(options: argparse.Namespace) -> list[tuple[str, str]]:
-    """The tables of docs/verdicts.md that are asked for, by their names."""
-    parts = []
+def judge_all(options: argparse.Namespace) -> list[tuple[str, str, Mapping[Any, Any]]]:
+    """The tables of docs/verdicts.md that are asked for: name, text, and outcomes by job."""
+    parts: list[tuple[str, str, Mapping[Any, Any]]] = []
     if options.only in (None, "honest"):
         jobs = honest.jobs()
         outcomes = dict(run_parallel(honest.evaluate, jobs, options.workers, options.scheduler))
-        parts.append(("honest", honest.table({job: outcomes[job] for job in jobs})))
+        outcomes = {job: outcomes[job] for job in jobs}
+        parts.append(("honest", honest.table(outcomes), outcomes))
     if options.only in (None, "verdicts"):
         real = [(name, options.figures) for name in verdicts.names()]
         answers = dict(run_parallel(verdicts.evaluate, real, options.workers, options.scheduler))
-        parts.append(("verdicts", verdicts.table({job[0]: answers[job] for job in real})))
+        by_name = {job[0]: answers[job] for job in real}
+        parts.append(("verdicts", verdicts.table(by_name), by_name))
         for name, _ in real if options.figures else ():
             text = answers[name, options.figures].text
             (options.figures / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
     if options.only in (None, "compensator"):
-        parts.append(("compensator", compensator.table(measure_compensators(options))))
+        reductions = measure_compensators(options)
+        parts.append(("compensator", compensator.table(reductions), reductions))
     return parts
 
 
@@ -191,6 +195,8 @@ def arguments() -> argparse.Namespace:
             "--write updates whole tables: use it with TAUTSCOPE_DATA, and without --only or with "
             f"--only loop, {', '.join(OF_VERDICTS)}"
         )
+    if options.json and options.only == "episodes":
+        parser.error("--json has no rows for --only episodes")
     if options.figures is not None:
         options.figures.mkdir(parents=True, exist_ok=True)
     return options
@@ -218,9 +224,12 @@ def main() -> None:
         rows += of_filter
         parts.append(("loop", loop.table(errors, of_filter)))
         facts["errors"] = errors
-    of_verdicts = judge_all(options)
+    judged = judge_all(options)
+    of_verdicts = [(name, text) for name, text, _ in judged]
+    if judged:
+        facts["outcomes"] = {name: outcome_rows(found) for name, _, found in judged}
     if options.json:
-        print(json.dumps({"rows": rows, **facts}))
+        print(json.dumps({"rows": rows, **facts}, default=asdict))
     else:
         print("\n\n".join(text for _, text in parts + of_verdicts))
     for page, tables in (("models.md", parts), ("verdicts.md", of_verdicts)):

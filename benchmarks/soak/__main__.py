@@ -14,11 +14,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from common.doc_pages import insert
 from common.paths import ROOT
-from common.processes import add_arguments, run_parallel
+from common.processes import Results, add_arguments, run_until_stopped
 from soak.cases import PLANTS, Case, Outcome, simulate
 from soak.references import MOTIONS
 from soak.rows import table, to_rows
-from tautscope.commands.printing import progress_bar
 
 STROKES = (0.3, 0.6, 1.0, 2.0)
 """Over the width of the slack."""
@@ -49,7 +48,7 @@ def arguments() -> argparse.Namespace:
     return options
 
 
-def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
+def measure(options: argparse.Namespace) -> Results[Case, Outcome]:
     """Simulate; Ctrl-C ends with the runs that are finished."""
     cases = [
         Case(plant, motion, stroke, seed, options.seconds)
@@ -58,28 +57,19 @@ def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
         for stroke in options.stroke or (STROKES_WITH_RESTS if motion == "rests" else STROKES)
         for seed in range(options.first_seed, options.first_seed + options.seeds)
     ]
-    done: dict[Case, Outcome] = {}
-    with progress_bar("soak") as show_progress:
-        try:
-            for case, outcome in run_parallel(simulate, cases, options.workers, options.scheduler):
-                done[case] = outcome
-                show_progress(len(done) / len(cases))
-        except KeyboardInterrupt:
-            pass
-    return {case: done[case] for case in cases if case in done}
+    return run_until_stopped(simulate, cases, options, "soak")
 
 
 def main() -> None:
     options = arguments()
     found = measure(options)
-    if not found:
-        raise SystemExit("No run is finished.")
     shown = table(found)
     if options.json:
         cases = [asdict(case) | asdict(outcome) for case, outcome in found.items()]
         print(json.dumps({"rows": to_rows(found), "cases": cases}))
     else:
         print(shown)
+    found.require_all()
     if options.write:
         last = options.first_seed + options.seeds - 1
         seeds = f"{options.first_seed}" if options.seeds == 1 else f"{options.first_seed} to {last}"

@@ -116,28 +116,34 @@ def _resident() -> int:
 
 
 def table(sessions: list[Session]) -> str:
-    """Return a Markdown table, a line for the first two and the last session."""
+    """Return a Markdown table: the first two sessions, the last, and the worst value of all."""
     labels = " | ".join(f"{dof.label} [{dof.display_unit}]" for dof in Dof)
     lines = [
         f"| session | {labels} | tick [us] | memory [MB] | files | threads | ticks lost |",
         "|--:|" + "--:|" * 8,
     ]
-    for number, each in enumerate(sessions, 1):
-        if 2 < number < len(sessions):
-            continue
-        cells = [
-            str(number),
-            *(f"{dof.display_scale * each.error[dof]:.3f}" for dof in Dof),
-            f"{1e6 * each.tick:.0f}",
-            f"{each.memory / 1e6:.1f}",
-            str(each.descriptors),
-            str(each.threads),
-            str(each.ticks - each.in_log),
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
+    rows = [
+        (
+            *(dof.display_scale * each.error[dof] for dof in Dof),
+            1e6 * each.tick,
+            each.memory / 1e6,
+            each.descriptors,
+            each.threads,
+            each.ticks - each.in_log,
+        )
+        for each in sessions
+    ]
+    shown = {str(number): row for number, row in enumerate(rows, 1)}
+    for number in range(3, len(rows)):
+        del shown[str(number)]
+    shown["worst of all"] = tuple(map(max, zip(*rows, strict=True)))
+    formats = [".3f"] * 3 + [".0f", ".1f", "d", "d", "d"]
+    for name, row in shown.items():
+        cells = (f"{value:{form}}" for value, form in zip(row, formats, strict=True))
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     total = sum(each.size for each in sessions)
-    rows = sum(each.ticks for each in sessions)
-    return "\n".join([*lines, "", f"{rows:,} ticks, {total / 1e9:.2f} GB of logs."])
+    ticks = sum(each.ticks for each in sessions)
+    return "\n".join([*lines, "", f"{ticks:,} ticks, {total / 1e9:.2f} GB of logs."])
 
 
 def main() -> None:

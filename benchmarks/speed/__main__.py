@@ -43,8 +43,10 @@ def control_tick(config: Config) -> list[float]:
     phase = np.linspace(0.0, 40 * np.pi, ticks)
     references = np.stack([s.centre + s.amplitude * np.sin(phase) for s in sines], axis=1)
     times = np.arange(ticks) * config.control.period
-    loop = construction.build_loop(config)
-    return nanoseconds(lambda: loop.run(references, times), ticks)
+    # Missing images, and a clock that goes back, would end compensation.
+    blind = config.replace(**{"safety.off": ("dropped",)})
+    loops = iter([construction.build_loop(blind) for _ in range(REPEATS)])
+    return nanoseconds(lambda: next(loops).run(references, times), ticks)
 
 
 def state_estimation(config: Config) -> tuple[list[float], list[float]]:

@@ -1,8 +1,12 @@
 """The benchmark of image conditions counts as it is defined."""
 
+import importlib
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
-from conditions import first_sight
+from conditions import backgrounds, first_sight
 from conditions.frames import Evaluation, Job, evaluate
 from conditions.rows import table, to_rows, wrong_accepted
 
@@ -51,3 +55,16 @@ def test_clean_sequences_are_found_within_five_images() -> None:
     assert len(sequences) == 3
     for is_found, is_wrong, longest in sequences:
         assert is_found and not is_wrong and longest > 0
+
+
+@pytest.mark.parametrize("name", ["__main__", "first_sight"])
+def test_missing_frames_are_said_at_the_start(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    campaign = importlib.import_module(f"conditions.{name}")
+    monkeypatch.setattr(backgrounds, "FRAMES", tmp_path / "colon_frames")
+    monkeypatch.setattr(campaign, "run_parallel", lambda *_: pytest.fail("measured"))
+    monkeypatch.setattr(sys, "argv", ["conditions"])
+    with pytest.raises(SystemExit):
+        campaign.main()
+    assert "Set TAUTSCOPE_DATA" in capsys.readouterr().err

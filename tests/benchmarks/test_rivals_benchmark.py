@@ -1,11 +1,24 @@
 """The rivals of `best`: their laws on ideal plays, the loss of images, and the rows of a cell."""
 
+from argparse import Namespace
+
 import numpy as np
 import pytest
+from common import processes
 from common.paths import ROOT
 from instruments.rival_controllers import Calibration, ConstantCompensation, VisualServoing
 from instruments.rival_runs import RivalFigures, RivalRun, measure_loop, simulate
-from instruments.rivals import NAMES, SERVOING, gains_of, plan, table, to_rows
+from instruments.rivals import (
+    NAMES,
+    RATES,
+    SERVOING,
+    TUNING_SEEDS,
+    gains_of,
+    plan,
+    table,
+    to_rows,
+    tuning_table,
+)
 from numpy.typing import NDArray
 from plants.simulated import HALF, PlantRig
 from play_model import play
@@ -97,6 +110,21 @@ def test_a_row_says_by_how_much_best_is_ahead() -> None:
     assert "| 80 ms | 20% | reduction, % | 80 / 80 / 80 | 50 / 50 / 50 | 90 / 90 / 90 | |" in table(
         found, (0.08,), (0.2,)
     )
+
+
+def test_tuning_shows_the_worst_instrument_of_each_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(run: RivalRun) -> RivalFigures:
+        unstable = run.name == "visual servoing" and run.seed == TUNING_SEEDS[0]
+        spread = 1.0 if run.name == "none" else 3.0 if unstable else 0.25
+        return RivalFigures([spread] * 3, [0.0] * 3)
+
+    monkeypatch.setattr(
+        processes, "run_parallel", lambda _, jobs, *options: ((job, run(job)) for job in jobs)
+    )
+    text = tuning_table(Namespace(workers=1, scheduler=None))
+    assert "| 20 ms | 3 / 3 / 3 | 75 / 75 / 75 | -200 / -200 / -200 |" in text
+    assert "| 5 / 5 / 5 | 75 / 75 / 75 | 75 / 75 / 75 |" in text
+    assert all(SERVOING[latency] in rates for latency, rates in RATES.items())
 
 
 def test_the_page_has_a_section_for_the_table() -> None:

@@ -1,5 +1,6 @@
 """The soak: its references, its tenths, and the goals of its rows."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,7 +22,7 @@ from soak.cases import (
     draw_faults,
     simulate,
 )
-from soak.endurance import run_session
+from soak.endurance import Session, run_session
 from soak.endurance import table as endurance_table
 from soak.references import (
     EASING,
@@ -101,6 +102,14 @@ def test_sessions_of_the_whole_loop_are_alike_and_lose_nothing(tmp_path: Path) -
     assert (first.descriptors, first.threads) == (second.descriptors, second.threads)
     assert not list(tmp_path.iterdir())
     assert "| 2 |" in endurance_table([first, second])
+
+
+def test_the_table_of_sessions_has_the_worst_value_of_all() -> None:
+    usual = Session([1e-3, 0.2, 0.3], 9e-6, 100_000_000, 6, 1, 1000, 1000, 10**9)
+    odd = replace(usual, error=[2e-3, 0.1, 0.3], memory=200_000_000, in_log=998, threads=4)
+    lines = endurance_table([usual, usual, odd, usual]).splitlines()[2:-2]
+    assert [line.split(" | ")[0] for line in lines] == ["| 1", "| 2", "| 4", "| worst of all"]
+    assert lines[-1] == "| worst of all | 2.000 | 0.200 | 0.300 | 9 | 200.0 | 6 | 4 | 2 |"
 
 
 @pytest.mark.parametrize("plant", PLANTS)

@@ -60,6 +60,15 @@ def test_a_leading_output_has_a_negative_width() -> None:
     assert metrics.loop_width(x, x).mean == pytest.approx(0, abs=1e-12)
 
 
+def test_the_largest_width_counts_both_directions() -> None:
+    """A loop that crosses itself: it leads by more at the bottom than it lags at the top."""
+    y = np.sin(TWO_PERIODS)
+    loop = metrics.loop_width(y + np.sign(np.cos(TWO_PERIODS)) * (0.2 * y - 0.1), y)
+    widths = 0.4 * loop.levels - 0.2
+    np.testing.assert_allclose(loop.widths, widths, atol=1e-3)
+    assert loop.max == pytest.approx(widths.min(), abs=1e-3)
+
+
 def test_a_repeated_sample_changes_nothing() -> None:
     x, y = settled_loop(1.0, -0.2, 0.4)
     plain = metrics.loop_width(x, y)

@@ -31,7 +31,7 @@ class LoopWidth:
 
     Attributes:
         mean: Mean over the levels that y passes both ways.
-        max: Largest width over these levels.
+        max: Width of the largest magnitude over these levels, with its sign.
         levels: (41,) values of y at which the width was measured.
         widths: (41,) width at each level; NaN where y does not pass both ways.
     """
@@ -86,7 +86,7 @@ def loop_width(
     passed = widths[np.isfinite(widths)]
     if len(passed) < COVERAGE * levels:
         return LoopWidth(np.nan, np.nan, at, widths)
-    return LoopWidth(float(passed.mean()), float(passed.max()), at, widths)
+    return LoopWidth(float(passed.mean()), float(max(passed, key=abs)), at, widths)
 
 
 def _width_at(x: Floats, height: Floats, deadband: float) -> float:
