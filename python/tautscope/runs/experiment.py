@@ -103,8 +103,10 @@ def run_experiment(
         recorder.add_tick(ticks.sample, desired, command)
         for source, report in ticks.updates():
             recorder.add_report(ticks.sample.time, source, report, elapsed)
+        supervision = ticks.loop.supervision
+        recorder.flags.add_tick(elapsed, supervision.flags, supervision.reaction)
         if watch is not None:
-            watch(ticks.loop.supervision)
+            watch(supervision)
         if (error := stop.update(ticks.sample.time)) is not None:
             error.recording = recording()
             raise error
