@@ -1,10 +1,13 @@
 """A newcomer's path: a rig of 2 DOFs with an EM tracker in 30 lines, and `run --rig`."""
 
 import io
+import itertools
 import json
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +15,12 @@ from tautscope import PlayRig, figure_style
 from tautscope.cli import main
 from tautscope.commands.rig_choice import choose_rig
 from tautscope.config import load_config
-from tautscope.errors import CalibrationError, ConfigError
+from tautscope.errors import STOPPED, CalibrationError, ConfigError
 from tautscope.hardware import jog
 from tautscope.hardware.doctor import rig as rig_checks
 from tautscope.log.writer import LogWriter
 from tautscope.loop.kinematics import TwoPlanes
+from tautscope.loop.reduction import HysteresisReduction
 from tautscope.runs.recording import Recording
 
 RIG = """
@@ -125,6 +129,42 @@ def test_a_rig_that_fails_leaves_what_it_did(
     with pytest.raises(AssertionError):
         run("--rig", "dead_rig:Catheter", "--out", "none")
     assert not (folder / "none").exists()
+
+
+@pytest.mark.parametrize(("raised", "call"), [(1, "close"), (2, "disable"), (2, "nothing")])
+def test_supervisor_reaction_reaches_a_rig_in_the_same_tick(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    raised: int,
+    call: str,
+) -> None:
+    """A second drive fault escalates to disable, of which a rig without it is closed."""
+    limits = "safety.hold_time = 0.0\nsafety.hold_travel = 0.0\n"
+    (folder / "robot.toml").write_text(limits + ROBOT, encoding="utf-8")
+    step, ticks, calls = HysteresisReduction.step, itertools.count(1), []
+
+    def step_with_fault(loop: HysteresisReduction, *values: Any, **more: Any) -> Any:
+        if next(ticks) == 20:
+            for _ in range(raised):
+                loop.raise_flag("drive_fault")
+        return step(loop, *values, **more)
+
+    def called(name: str) -> Callable[[PlayRig], None]:
+        return lambda rig: calls.append((name, rig.ticks))
+
+    monkeypatch.setattr(HysteresisReduction, "step", step_with_fault)
+    monkeypatch.setattr(PlayRig, "close", called("close"))
+    if call != "nothing":
+        monkeypatch.setattr(PlayRig, "disable", called("disable"), raising=False)
+    assert run("--rig", "tautscope:PlayRig", "--out", "out") == STOPPED
+    # The last command sent is that of the tick before; the reset took one.
+    assert calls[0] == (call.replace("nothing", "close"), 20)
+    assert next(ticks) == 21
+    error = capsys.readouterr().err
+    assert f"loop: {'quick_stop' if raised == 1 else 'disable'} (drive_fault)" in error
+    assert f"The motors are {'without power' if call == 'disable' else 'stopped'}" in error
+    assert "tautscope report out/uncompensated.mcap" in error
 
 
 def test_the_motors_of_a_rig_that_fails_do_not_wait_for_the_log(

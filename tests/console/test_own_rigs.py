@@ -49,8 +49,9 @@ from tautscope.errors import STOPPED, StateError
 from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop import vision
+from tautscope.loop.actuators import with_actuators
 from tautscope.loop.kinematics import TwoPlanes
-from tautscope.loop.rig import Rig, Sample, reset_unless
+from tautscope.loop.rig import Rig, Sample, disable, reset_unless
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
 from tautscope.twin.rig import Twin
@@ -267,6 +268,33 @@ def test_disabling_reaches_a_rig_that_can(tmp_path: Path) -> None:
         control.open()
         control.close("monitor", is_disabling=True)
         assert arm.is_disabled
+
+
+def paced(rig: Rig) -> Rig:
+    return PacedRig(lambda: rig, rig.control_period, is_simulated=False)
+
+
+def actuated(rig: Rig) -> Rig:
+    config = tautscope.axes(2, width_limit=1.0)
+    return with_actuators(rig, config.replace(actuators={"matrix": np.eye(2).tolist()}))
+
+
+@pytest.mark.parametrize("wrap", [paced, actuated, lambda rig: paced(actuated(rig))])
+@pytest.mark.parametrize("is_able", [True, False])
+def test_a_wrapped_rig_is_interrupted_and_disabled_as_the_rig_itself(
+    monkeypatch: pytest.MonkeyPatch, wrap: Callable[[Rig], Rig], is_able: bool
+) -> None:
+    class Able(Interrupted, Disabled): ...
+
+    monkeypatch.setattr(Slow, "duration", 20.0 if is_able else 0.05)
+    arm, closed = Able(2) if is_able else Slow(2), []
+    monkeypatch.setattr(arm, "close", lambda: closed.append(True))
+    rig = wrap(arm)
+    with pytest.raises(StateError, match="interrupted" if is_able else "Enable it again"):
+        reset_unless(rig, lambda: True)
+    disable(rig)
+    assert arm.is_interrupted == getattr(arm, "is_disabled", False) == is_able
+    assert bool(closed) != is_able
 
 
 @pytest.mark.parametrize("is_running", [False, True])

@@ -27,13 +27,13 @@ from tautscope.errors import (
     may_move,
     notes,
 )
-from tautscope.hardware.experiment import _apply_reaction, run_on_hardware
+from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing, read_sent
 from tautscope.log.reader import read_log
 from tautscope.loop.reduction import HysteresisReduction
-from tautscope.loop.rig import Rig
+from tautscope.loop.rig import Rig, apply_reaction
 from tautscope.loop.safety import Reaction
 from tautscope.runs.experiment import HELD_TIME
 from waiting import until
@@ -279,7 +279,7 @@ def test_motors_that_were_stopped_before_are_not_said_to_be_without_power(
     one = setup(drives={"command_timeout": 0.05})
     timed_out(one)
     with pytest.raises(DriveError, match=r"loop: disable \(drive_fault\)") as found:
-        _apply_reaction(
+        apply_reaction(
             one.rig,
             SimpleNamespace(reaction=Reaction.DISABLE, flags=("drive_fault",)),  # type: ignore[arg-type]
         )

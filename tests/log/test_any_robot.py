@@ -1,11 +1,12 @@
 """Logs of robots with [[dof]]: any number of degrees of freedom, and any sensors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from play_rig import (
     Sensor,
     SensorRig,
@@ -16,11 +17,11 @@ from play_rig import (
     by_quaternion,
 )
 from rosbags.highlevel import AnyReader
-from tautscope import HysteresisReduction, Pose, Tip
+from tautscope import HysteresisReduction, PlayRig, Pose, Tip
 from tautscope.commands.robot import bytes_per_second
 from tautscope.config import Config, Sine, axes, load_config
 from tautscope.errors import ConfigError, RecordError
-from tautscope.log import topics
+from tautscope.log import stored_run, topics
 from tautscope.log.alignment import align_recording
 from tautscope.log.export import export_csv, recover
 from tautscope.log.fields import multi_array
@@ -28,12 +29,13 @@ from tautscope.log.header import header_messages, read_header
 from tautscope.log.messages import Clock, Codec
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.replay import estimate_from_log, replay_same
+from tautscope.log.stored_run import read_run
 from tautscope.log.writer import LogWriter
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.references import OperatorMotion
 from tautscope.loop.rig import Sample
 from tautscope.runs.experiment import run_experiment
-from tautscope.runs.recording import Recording
+from tautscope.runs.recording import Recording, per_dof
 
 SECONDS = 1.0
 MIXED = (by_joints, by_quaternion, by_position, by_points)
@@ -95,6 +97,66 @@ def test_a_run_with_a_tracker_replays_to_the_bit(tracked: tuple[Path, Recording]
 
 def test_a_run_of_several_sensors_replays_to_the_bit(mixed: tuple[Path, Recording]) -> None:
     assert_replays(*mixed)
+
+
+class Silent(PlayRig):
+    """Its sensor measures from a time to another [s]."""
+
+    times = 0.0, 2.0
+
+    def measure(self, tip: NDArray[np.float64], time: float) -> Iterable[Measurement]:
+        first, last = self.times
+        return super().measure(tip, time) if first <= time <= last else ()
+
+
+@pytest.mark.parametrize("times", [(0.0, 2.0), (99.0, 99.0), (1.5, 99.0)])
+def test_a_sensor_that_falls_silent_is_in_the_warnings_of_run_and_log(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, times: tuple[float, float]
+) -> None:
+    monkeypatch.setattr(Silent, "times", times)
+    config, path = axes(1, width_limit=1.2, range=(-2, 2)), tmp_path / "run.mcap"
+    motion = OperatorMotion([Sine(centre=0.0, amplitude=1.0)], 3, 14.0)
+    with LogWriter(path, config, wait=True) as log:
+        run = run_experiment(Silent(config), motion, config, log=log)
+    line, stored = (
+        next(line for line in warnings if line.startswith("dropped ("))
+        for warnings in (run.warnings, read_run(path).main.warnings)
+    )
+    assert stored == line
+    is_lasting = times[1] < 99 or times[0] == 99
+    assert line.endswith("the compensation faded out meanwhile") == is_lasting
+    assert ("also at its end" in line) == is_lasting
+
+
+@pytest.mark.parametrize("profile", ["best", "paper"])
+def test_before_a_measurement_the_recorded_offsets_are_those_in_use(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, profile: str
+) -> None:
+    monkeypatch.setattr(Silent, "times", (99.0, 99.0))
+    config = axes(2, width_limit=[1.2, 0.5], range=(-2, 2)).replace(profile=profile)
+    motion = OperatorMotion([Sine(centre=0.0, amplitude=0.4)] * 2, 3, 1.5)
+    with LogWriter(tmp_path / "run.mcap", config, wait=True) as log:
+        run = run_experiment(Silent(config), motion, config, log=log)
+    offsets = HysteresisReduction(config).delta_plus
+    assert (offsets > 0).all() == (profile == "best")
+    for each in (run, read_run(tmp_path / "run.mcap").main):
+        recorded = per_dof(each.trace, "delta_plus", config.dof)
+        np.testing.assert_array_equal(recorded, np.broadcast_to(offsets, recorded.shape))
+
+
+def test_measurements_that_only_the_log_lacks_are_not_called_missing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    record(tmp_path / "run.mcap", axes(1, width_limit=1.0))
+    log = read_log(tmp_path / "run.mcap")
+    for index, event in [*log.events.items()][:-20]:
+        if isinstance(event, Update) and event.row["arrived_at"] > 0.5:
+            del log.events[index]
+    monkeypatch.setattr(stored_run, "read_log", lambda path: log)
+    monkeypatch.setattr(stored_run, "LEAST_DURATION", 0.9)
+    warnings = read_run(tmp_path / "run.mcap").main.warnings
+    assert [line for line in warnings if "not in run.mcap" in line]
+    assert not [line for line in warnings if line.startswith("dropped")]
 
 
 def test_a_changed_measurement_is_found(mixed: tuple[Path, Recording]) -> None:

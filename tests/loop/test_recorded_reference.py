@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from common.paths import ROOT
+from numpy.typing import ArrayLike
 from refused import failed
 from scipy.interpolate import interp1d
-from tautscope.config import Config, load_config
+from tautscope.config import Config, axes, load_config
 from tautscope.dof import Dof
+from tautscope.errors import SignalError
 from tautscope.references import RecordedReference
 
 CONFIG = Config()
@@ -28,6 +30,36 @@ def test_after_the_approach_it_is_linear_between_the_rows() -> None:
     times = RNG.uniform(TIME[0], TIME[-1], 500)
     found = [REFERENCE(time + shift) for time in times]
     np.testing.assert_allclose(found, interp1d(TIME, POSITION, axis=0)(times), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("time", "position", "field"),
+    [
+        (TIME[::-1], POSITION, "time[1]"),
+        (np.where(TIME[7] == TIME, np.nan, TIME), POSITION, "time[7]"),
+        (np.where(TIME[0] == TIME, -np.inf, TIME), POSITION, "time[0]"),
+        (np.where(TIME[-1] == TIME, np.inf, TIME), POSITION, f"time[{len(TIME) - 1}]"),
+        ([0.0, 1.0, 1.0], POSITION[:3], "time[2]"),
+        (TIME[:1], POSITION[:1], "time"),
+        (5.0, POSITION, "time"),
+        ("a", POSITION, "time"),
+        (TIME, POSITION[1:], "position"),
+        (TIME, POSITION[:, :2], "position"),
+        (TIME, POSITION.T, "position"),
+        (TIME, None, "position"),
+        (TIME, np.where(POSITION[5, 1] == POSITION, np.nan, POSITION), "position[5]"),
+    ],
+)
+def test_a_wrong_record_is_named(time: ArrayLike, position: ArrayLike, field: str) -> None:
+    with pytest.raises(SignalError) as error:
+        RecordedReference(time, position, CONFIG)
+    assert error.value.field == field
+    assert len(str(error.value)) < 200 or time is TIME
+
+
+def test_a_record_is_of_three_degrees_of_freedom() -> None:
+    with pytest.raises(SignalError, match=r"axis_1, axis_2.*insertion, rotation, bending"):
+        RecordedReference(TIME, POSITION[:, :2], axes(2, width_limit=1.0))
 
 
 def test_the_approach_is_slow_and_meets_the_record() -> None:

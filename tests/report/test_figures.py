@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import matplotlib
 import numpy as np
+import pytest
 from tautscope.dof import Dof
 from tautscope.figure_style import BLUE, ORANGE
+from tautscope.loop.vision import MarkerDetector
 from tautscope.report import figures
 from tautscope.report.operator_figure import draw_operator_motion
 from tautscope.runs.recording import Recording
@@ -89,6 +91,38 @@ def test_the_operator_figure_has_both_tips_and_both_errors(
     assert set(lines) == {
         "tip without compensation", "command", "tip with compensation", "reference",
     }  # fmt: skip
+
+
+def test_the_mask_of_figure5_is_that_of_its_regions(runs: tuple[Recording, Recording]) -> None:
+    """Also where the trained discriminant finds nothing, and an alternative is used."""
+    snapshot, config = runs[1].snapshot, runs[1].config
+    assert snapshot is not None
+    trained = figures.figure5(snapshot, config).axes[1].images[0].get_array()
+    dark = config.replace(**{
+        "vision.weights": (1.0, 1.0, 1.0),
+        "vision.threshold": 200.0,
+        "vision.alternatives": (((0.5, 0.5, 0.5), 200.0), ((-0.525, 1.0, -0.648), 5.0)),
+    })  # fmt: skip
+    detector = MarkerDetector(dark)
+    assert detector.detect(snapshot.image, snapshot.predicted_features).discriminant == 2
+    figure = figures.figure5(snapshot, dark)
+    np.testing.assert_array_equal(figure.axes[1].images[0].get_array(), trained)
+    assert len(figure.axes[2].patches) >= 2
+
+
+@pytest.mark.parametrize("index", range(5))
+def test_every_discriminant_has_a_mask(
+    runs: tuple[Recording, Recording], monkeypatch: pytest.MonkeyPatch, index: int
+) -> None:
+    snapshot = runs[1].snapshot
+    assert snapshot is not None
+    detect = MarkerDetector.detect
+    monkeypatch.setattr(
+        MarkerDetector,
+        "detect",
+        lambda *arguments: replace(detect(*arguments), discriminant=index),
+    )
+    assert figures.figure5(snapshot, runs[1].config).axes[1].images[0].get_array().any()
 
 
 def test_figure5_labels_the_markers_at_their_features(runs: tuple[Recording, Recording]) -> None:

@@ -175,6 +175,61 @@ def test_a_bad_reference_is_named(value: ArrayLike) -> None:
     assert error.value.field == "reference"
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("duration", None),
+        ("duration", np.nan),
+        ("duration", np.inf),
+        ("duration", 0.0),
+        ("duration", "3"),
+        ("segments", None),
+        ("segments", 3),
+        ("segments", [(0.0, 1.0)]),
+    ],
+)
+def test_a_reference_without_an_end_moves_no_motor(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: object
+) -> None:
+    rig = DrawnRig(CONFIG)
+    monkeypatch.setattr(rig, "reset", lambda: pytest.fail("the motors move"))
+    if value is None:
+        monkeypatch.delattr(Constant, name)
+    else:
+        monkeypatch.setattr(Constant, name, value)
+    with pytest.raises(SignalError) as error:
+        run_experiment(rig, Constant([25e-3, 0, 1.2]), CONFIG)
+    assert error.value.field == f"reference.{name}"
+
+
+def test_a_late_reference_rests_also_where_only_its_call_says_when_it_was_made() -> None:
+    """Against a reference that has the attribute from the start."""
+
+    class Late:
+        duration, segments = 0.5, ()
+
+        def __call__(self, time: float) -> NDArray[np.float64]:
+            self.made_at = time if time < 0.2 else 0.2
+            return np.array([25e-3 + 1e-3 * time, 0.0, 1.2])
+
+    class Known(Late):
+        made_at = 0.0
+
+    late, known = (run_experiment(DrawnRig(CONFIG), each, CONFIG) for each in (Late(), Known()))
+    np.testing.assert_array_equal(per_dof(late.trace, "command"), per_dof(known.trace, "command"))
+    assert any(line.startswith("reference_late (") for line in late.warnings)
+    after = late.trace["time"] > late.trace["time"][0] + 0.2 + CONFIG.safety.reference_age
+    assert np.ptp(late.trace["command_insertion"][after][1:]) == 0.0
+
+
+@pytest.mark.parametrize("value", ["soon", np.nan, [0.0]])
+def test_a_bad_time_of_a_reference_is_named(value: object) -> None:
+    reference = Constant([25e-3, 0, 1.2])
+    reference.made_at = value  # type: ignore[attr-defined]
+    with pytest.raises(SignalError, match=r"reference\.made_at: got .* number of seconds"):
+        run_experiment(DrawnRig(CONFIG), reference, CONFIG)
+
+
 def test_a_camera_of_another_size_is_named() -> None:
     with pytest.raises(FrameError, match=r"720"):
         run(BadFrameRig(CONFIG))

@@ -34,14 +34,27 @@ def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
         "lost (nothing was measured that agrees with the prediction: no marker, or no value of a "
         "sensor) at 2 of 4 images"
     )
-    assert "first 0.0 s into the run; the compensation faded out meanwhile" in lost
+    assert "first 0.0 s into the run, for 0.0 s in all; the compensation faded out" in lost
     assert late.startswith("late (") and "at 2 of 4 images, first 0.1 s" in late
 
 
-def test_a_flag_between_two_images_is_listed() -> None:
+def test_a_line_says_for_how_long_and_whether_to_the_end() -> None:
+    flags, period = FlagSummary(Config()), Config().control.period
+    flags.add(0.0, (), Reaction.NONE)
+    for tick in range(100, 1000):
+        names = ("dropped", *["tremor"] * (tick < 500))
+        reaction = Reaction.FADE if tick == 990 else Reaction.HOLD_ESTIMATE
+        flags.add_tick(period * tick, names, reaction)
+    dropped, tremor = flags.lines(("dropped", "tremor"))
+    assert "at 0 of 1 images, first 0.5 s into the run, for 4.5 s in all, also at" in dropped
+    assert "the compensation faded out meanwhile" in dropped
+    assert "first 0.5 s into the run, for 2.0 s in all; the estimates were held" in tremor
+
+
+def test_a_flag_within_a_tick_is_listed() -> None:
     (line,) = summarise([(Reaction.NONE, ())], ("reference_jump",))
     assert line.startswith("reference_jump (the reference jumped")
-    assert line.endswith("between two images")
+    assert line.endswith("for less than a control period")
 
 
 def test_of_another_robot_they_are_measurements() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from drawn import EXAMPLES
 from play_model import play
 from tautscope import PlayRig, Pose, Tip, axes, load_config, run_experiment
 from tautscope.config import Config, Sine
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import with_actuators
 from tautscope.loop.references import OperatorMotion
 from tautscope.report.operator_motion import motion_of
@@ -46,6 +47,62 @@ def test_motors_pose_and_what_does_not_move_the_tip() -> None:
     assert jaw.sensor == 1
     assert np.isnan(jaw.values[:4]).all()
     assert first.time - pose.captured_at == pytest.approx(0.05, abs=0.0051)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("slack", [0.5, 0.3, 0.2]),
+        ("slack", [0.5, 0.3, 0.2, 0.1]),
+        ("slack", [-0.5, 0.3]),
+        ("slack", [np.nan, 0.3]),
+        ("slack", np.zeros((2, 0))),
+        ("slack", np.zeros((2, 1, 1))),
+        ("slack", "wide"),
+        ("gains", [1.0, 1.0, 1.0]),
+        ("gains", [[1.0], [1.0]]),
+        ("zeros", "a"),
+        ("zeros", np.inf),
+        ("delay", np.nan),
+    ],
+)
+def test_a_wrong_argument_is_named(field: str, value: Any) -> None:
+    with pytest.raises(SignalError) as error:
+        PlayRig(axes(2, width_limit=1.0), **{field: value})
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize("command", [[np.nan, 0.0], [0.0] * 3, None, 0.0, [[0.0, 0.0]]])
+def test_a_wrong_command_is_named_and_moves_nothing(command: Any) -> None:
+    rig, other = (PlayRig(axes(2, width_limit=1.0)) for _ in range(2))
+    with pytest.raises(SignalError, match=r"rig: .* reset\(\)"):
+        rig.step([0.0, 0.0])
+    rig.reset()
+    with pytest.raises(SignalError, match="command"):
+        rig.step(command)
+    other.reset()
+    states = [each.step([0.4, 0.4]) for each in (rig, other)]
+    assert states[0].time == states[1].time
+    np.testing.assert_array_equal(states[0].true_state, states[1].true_state)
+
+
+def test_motors_without_a_way_back_are_refused() -> None:
+    actuators = {"map": "test_play_rig:doubled"}
+    rig = PlayRig(axes(2, width_limit=1.0).replace(actuators=actuators))
+    with pytest.raises(SignalError, match=r"actuators\.map: .* dofs\(motors\)"):
+        rig.reset()
+
+
+def doubled(dofs: Floats) -> Floats:
+    return 2 * dofs
+
+
+def test_one_slack_is_that_of_all() -> None:
+    config = axes(2, width_limit=1.0)
+    rigs = PlayRig(config, 0.6), PlayRig(config, [0.6, 0.6]), PlayRig(config, [[0.6], [0.6]])
+    for rig in rigs:
+        rig.reset()
+        np.testing.assert_array_equal(rig.step([1.0, -1.0]).true_state, [0.7, -0.7])
 
 
 class LateRig(PlayRig):

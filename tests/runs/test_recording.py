@@ -169,6 +169,10 @@ def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) ->
     frames.write_text("\n".join([header, ",".join(cells.values()), *rows]))
     with pytest.raises(RecordError, match=r"frames\.csv"):
         Recording.load(folder)
+    for cell in ("TRUE", "1", ""):
+        frames.write_text("\n".join([header, row.replace("True", cell, 1), *rows]))
+        with pytest.raises(RecordError, match=rf"frames\.csv: \w+: got '{cell}', .* True or False"):
+            Recording.load(folder)
     trace.write_text(whole.replace("reference_insertion", "u", 1))
     with pytest.raises(RecordError, match=r"trace\.csv.*expected the columns time"):
         Recording.load(folder)

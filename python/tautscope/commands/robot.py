@@ -4,6 +4,7 @@ import argparse
 import json
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_rig import confirm_motion
@@ -11,7 +12,7 @@ from tautscope.commands.printing import announce, print_json, progress_bar
 from tautscope.commands.result_lines import print_results
 from tautscope.config import Config
 from tautscope.hardware.signals import exit_on_signals
-from tautscope.loop.rig import Rig
+from tautscope.loop.rig import Rig, apply_reaction
 from tautscope.report.operator_motion import motion_of
 from tautscope.report.recorded_run import RecordedRun
 from tautscope.runs.experiment import run_experiment
@@ -75,7 +76,10 @@ def run(
                 run_log(path, config, compensate=compensate, wait=is_simulated) as log,
                 closing(make_rig(config)) as rig,
             ):
-                runs.append(run_experiment(rig, motion, config, compensate, report, log=log))
+                watch = None if is_simulated else partial(apply_reaction, rig)
+                runs.append(
+                    run_experiment(rig, motion, config, compensate, report, log=log, watch=watch)
+                )
             runs[-1].write(folder, suffix)
     found = RecordedRun(runs[1], runs[0])
     found.write_report(folder, {"rig": name})

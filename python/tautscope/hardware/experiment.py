@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from tautscope.config import Config
-from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError, described
+from tautscope.errors import STOPPED, OutputError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor, check_experiment
 from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
@@ -14,7 +14,7 @@ from tautscope.hardware.run_results import HardwareRun, ProtocolRun
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.writer import run_log
 from tautscope.loop.references import Reference, SineSequence
-from tautscope.loop.safety import Reaction, Supervision
+from tautscope.loop.rig import apply_reaction
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import check_free
 
@@ -98,7 +98,7 @@ def _run(
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
                 log=log,
                 executor=executor,
-                watch=lambda supervision: _apply_reaction(rig, supervision),
+                watch=partial(apply_reaction, rig),
                 monitor=partial(PlausibilityMonitor, config),
             )
         except BaseException as error:
@@ -110,24 +110,3 @@ def _run(
             executor.shutdown()
     progress(1.0)
     return ProtocolRun(recording, rig.timing, log.close())
-
-
-def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
-    """Apply a quick stop or disable to the drives, in the tick of the decision, and raise it."""
-    reaction = supervision.reaction
-    if reaction.rank < Reaction.QUICK_STOP.rank:
-        return
-    is_disabled = reaction is Reaction.DISABLE
-    done, failed = f"The motors are {'without power' if is_disabled else 'stopped'}. ", ""
-    try:
-        rig.disable() if is_disabled else rig.close()
-    except TautscopeError as error:
-        done, failed = "", described(error)
-    stop = DriveError(
-        "loop",
-        f"{reaction} ({', '.join(supervision.flags)})",
-        f"{done}docs/safety.md explains the flags; the log shows the cause",
-    )
-    if failed:
-        stop.add_note(failed)
-    raise stop

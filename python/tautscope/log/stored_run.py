@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tautscope.errors import MissingPathError, RecordError
-from tautscope.log.reader import Log, Update, read_log
+from tautscope.log.reader import Log, Tick, Update, read_log
+from tautscope.log.silence import Silence
 from tautscope.loop.safety import Reaction, disabled_monitors
 from tautscope.report.recorded_run import RecordedRun
 from tautscope.runs.flag_summary import FlagSummary
@@ -20,6 +21,7 @@ PLAIN = "_uncompensated"
 """Suffix of the tables of a run without compensation."""
 LEAST_DURATION = 1.0
 """Of a run that is evaluated [s]."""
+_DROPPED = "dropped"
 
 
 def read_run(
@@ -102,12 +104,26 @@ def _updates(log: Log) -> list[tuple[int, Update]]:
 
 
 def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
-    """A line for each flag that was in force at an update."""
-    summary = FlagSummary(recording.config)
-    elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
-    for at, (_, update) in zip(elapsed, _updates(log), strict=True):
-        _, values = update.status
-        summary.add(float(at), values["warnings"].split(","), Reaction(values["reaction"]))
+    """A line for each flag that was in force at an update, or because none arrived."""
+    summary, silence = FlagSummary(recording.config), Silence(recording.config)
+    start = float(recording.trace["time"][0])
+    flags, reaction, last = [""], Reaction.NONE, 0
+    for index, event in log.events.items():
+        if isinstance(event, Update):
+            now, (_, values) = float(event.row["arrived_at"]), event.status
+            flags, reaction = values["warnings"].split(","), Reaction(values["reaction"])
+            silence.end(now, is_dropped=_DROPPED in flags)
+            summary.add(now - start, flags, reaction)
+        elif isinstance(event, Tick):
+            now = event.sample.time
+            if index > last + 1:  # an update may be missing in the log alone
+                silence.end(now, is_dropped=_DROPPED in flags)
+            found = silence.update(now, event.reference)
+            is_known = found is Reaction.NONE or _DROPPED in flags
+            names = flags if is_known else [*flags, _DROPPED]
+            strongest = max(reaction, found, key=lambda each: each.rank)
+            summary.add_tick(now - start, names, strongest)
+        last = index
     return summary.lines()
 
 

@@ -13,7 +13,7 @@ from tautscope.config.actuators import scaled_matrix
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.named_class import instance, named_class
-from tautscope.loop.rig import Rig, Sample
+from tautscope.loop.rig import OPTIONAL, Rig, Sample
 from tautscope.loop.signal_checks import as_numbers, check_signal
 
 Map = Callable[[Floats], ArrayLike]
@@ -143,11 +143,15 @@ def _user_map(name: str) -> tuple[Map, Map | None]:
 class ActuatedRig:
     """A `Rig` of degrees of freedom made of one that takes and reports motors.
 
-    Where the map has no way back, `Sample.applied` is the command sent, NaN before the first.
+    Where the map has no way back, `Sample.applied` is the command sent, NaN before the first. It
+    has `interrupt` and `disable` if the rig has them.
     """
 
     def __init__(self, rig: Rig, config: Config) -> None:
         self._rig, self.control_period = rig, rig.control_period
+        for name in OPTIONAL:
+            if hasattr(rig, name):
+                setattr(self, name, getattr(rig, name))
         self.actuators = Actuators(config)
         self._sent: Floats | None = None
         self._count = len(config.dof)

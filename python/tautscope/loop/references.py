@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from tautscope.config import Config, ExperimentConfig, Sine
 from tautscope.dof import Dof, NamedDof
+from tautscope.errors import SignalError
 from tautscope.loop.kinematics import Floats
+from tautscope.loop.signal_checks import as_numbers
 
 Value = TypeVar("Value", float, Floats)
 
@@ -222,18 +224,37 @@ class RecordedReference:
         time: (n,) [s], increasing; n at least 2.
         position: (n, 3) [m, rad, rad].
         config: `experiment` has the centres.
+
+    Raises:
+        SignalError: Time or position is not as described, or there are other than 3 DOFs.
     """
 
     segments: ClassVar[tuple[Segment, ...]] = ()
 
     def __init__(self, time: ArrayLike, position: ArrayLike, config: Config) -> None:
-        self._position = np.array(position, dtype=np.float64)
+        if len(config.dofs) != len(Dof):
+            found, allowed = (", ".join(dof.label for dof in dofs) for dofs in (config.dofs, Dof))
+            raise SignalError("config.dofs", found, allowed)
+        stamps = as_numbers("time", time, "an array (n,)")
+        if stamps.ndim != 1 or len(stamps) < 2:
+            raise SignalError("time", f"an array {stamps.shape}", "an array (n,), n at least 2")
+        is_bad = ~np.isfinite(stamps)
+        is_bad[1:] |= ~(stamps[1:] > stamps[:-1])
+        if is_bad.any():
+            at = int(np.argmax(is_bad))
+            raise SignalError(f"time[{at}]", float(stamps[at]), "a finite time after the last one")
+        shape = len(stamps), len(Dof)
+        self._position = np.array(as_numbers("position", position, f"an array {shape}"))
+        if self._position.shape != shape:
+            raise SignalError("position", f"an array {self._position.shape}", f"an array {shape}")
+        for at in np.flatnonzero(~np.isfinite(self._position).all(axis=1))[:1]:
+            row = self._position[at].tolist()
+            raise SignalError(f"position[{at}]", row, "finite numbers [m, rad, rad]")
         centre = np.array([config.experiment[dof].centre for dof in Dof])
         slow = APPROACH_SPEED * np.array(config.safety.reference_speed)
         self._approach = Move(centre, self._position[0], slow, 1.0)
         self.approach = self._approach.duration
         """Duration of the approach [s]."""
-        stamps = np.array(time, dtype=np.float64)
         self._time = stamps - stamps[0] + self.approach
         self.duration: float = float(self._time[-1])
 

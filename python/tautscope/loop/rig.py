@@ -12,13 +12,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
-from tautscope.errors import SignalError, StateError
+from tautscope.errors import (
+    STOPPED,
+    DriveError,
+    SignalError,
+    StateError,
+    TautscopeError,
+    described,
+)
 from tautscope.loop.measurement import Measurement, Points, Pose, Tip
+from tautscope.loop.safety import Reaction, Supervision
 from tautscope.loop.signal_checks import as_numbers, check_time
 
 _WATCH_PERIOD = 0.005
 """Time between two calls of `must_stop` [s]."""
 _STOPPED = "stopped while it was being enabled"
+OPTIONAL = ("interrupt", "disable")
+"""Methods that a rig may have beside those of `Rig`: see `reset_unless` and `disable`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,6 +146,35 @@ def disable(rig: Rig) -> None:
     """`disable` of a rig that has it, as `MotorRig`: nothing holds its motors; else `close`."""
     end: Callable[[], None] = getattr(rig, "disable", rig.close)
     end()
+
+
+def apply_reaction(rig: Rig, supervision: Supervision) -> None:
+    """Apply a quick stop or disable of the supervisor to a rig, and raise it.
+
+    For the `watch` of `run_experiment`, so that it is in the tick of the decision.
+
+    Raises:
+        DriveError: The motors were stopped; its notes say so if they may still move.
+    """
+    reaction = supervision.reaction
+    if reaction.rank < Reaction.QUICK_STOP.rank:
+        return
+    is_disabled = reaction is Reaction.DISABLE
+    is_without_power = is_disabled and hasattr(rig, "disable")
+    done, failed = f"The motors are {'without power' if is_without_power else 'stopped'}. ", ""
+    try:
+        disable(rig) if is_disabled else rig.close()
+    except TautscopeError as error:
+        done, failed = "", described(error)
+    stop = DriveError(
+        "loop",
+        f"{reaction} ({', '.join(supervision.flags)})",
+        f"{done}docs/safety.md explains the flags; the log shows the cause",
+    )
+    stop.exit_status = STOPPED
+    if failed:
+        stop.add_note(failed)
+    raise stop
 
 
 def check_sample(sample: Sample, config: Config) -> Sample:

@@ -153,22 +153,26 @@ def _loop_legend(runs: list[Recording]) -> Iterator[Artist]:
 def figure5(snapshot: Snapshot, config: Config) -> Figure:
     """The article's Fig. 5: marker detection in one frame.
 
-    (a) the frame, (b) the pixels above the discriminant's threshold, (c) the regions, the markers
-    labelled, (d) measured and predicted features, magnified.
+    (a) the frame, (b) the pixels above the threshold of the discriminant that was used, (c) the
+    regions, the markers labelled, (d) measured and predicted features, magnified.
     """
-    detector = MarkerDetector(config)
-    regions = detector.detect(snapshot.image, snapshot.predicted_features).regions
+    found = MarkerDetector(config).detect(snapshot.image, snapshot.predicted_features)
+    own = config.vision
+    used = [(own.weights, own.threshold), *own.alternatives, *own.unlocated.alternatives]
+    weights, threshold = used[found.discriminant]
+    changed = {"vision.weights": weights, "vision.threshold": threshold}
+    mask = MarkerDetector(config.replace(**changed)).mask(snapshot.image)
     image = np.ascontiguousarray(snapshot.image[:, :, ::-1])
     measured, predicted = snapshot.features.reshape(2, 2), snapshot.predicted_features.reshape(2, 2)
     with style():
         figure = Figure(figsize=(PAGE, 6.1), layout="constrained")
         axes = figure.subplots(2, 2).ravel()
         axes[0].imshow(image)
-        axes[1].imshow(detector.mask(snapshot.image), cmap="gray", interpolation="nearest")
+        axes[1].imshow(mask, cmap="gray", interpolation="nearest")
         above = Rectangle((0, 0), 1, 1, facecolor="white", label="above the threshold")
         axes[1].legend(handles=[above], **_ON_IMAGE)
         axes[2].imshow(image // 2)
-        for region in regions:
+        for region in found.regions:
             left, top, width, height = region.box
             outline = Rectangle(
                 (left - 0.5, top - 0.5), width, height, fill=False, color=SKY, linewidth=1.2

@@ -1,18 +1,20 @@
 """Runs of a reference on a rig."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from typing import Any
 
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.errors import MotionHeldError
+from tautscope.errors import MotionHeldError, SignalError
 from tautscope.loop.actuators import with_actuators
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
-from tautscope.loop.references import DatedReference, Reference
+from tautscope.loop.references import Reference, Segment
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
+from tautscope.loop.signal_checks import check_time
 from tautscope.runs.control_loop import ControlLoop, Floats, ImageUpdate, Log, Monitor
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording, Snapshot
@@ -70,12 +72,13 @@ def run_experiment(
     Raises:
         MotionHeldError: Motion was held, and nobody could re-engage it. The error has the recording
             up to this time.
-        SignalError: The reference is not n finite numbers, a sample is not as `Sample` says, or the
-            rig's clock does not advance.
+        SignalError: The reference is not n finite numbers, or its `duration`, `segments` or
+            `made_at` are not as described; a sample is not as `Sample` says, or the rig's clock
+            does not advance.
         FrameError: An image is not what the configured camera gives.
     """
     rig = with_actuators(rig, config)
-    dated = reference if isinstance(reference, DatedReference) else None
+    _check_reference(reference)
     ticks = ControlLoop(
         config, rig, compensate=compensate, look=look, executor=executor, monitor=monitor
     )
@@ -94,12 +97,16 @@ def run_experiment(
     start = ticks.sample.time
     while (elapsed := ticks.sample.time - start) < reference.duration:
         desired = reference(elapsed)
-        command = ticks.control(desired, None if dated is None else start + dated.made_at)
+        made = getattr(reference, "made_at", None)
+        made_at = None if made is None else start + check_time("reference.made_at", made)
+        command = ticks.control(desired, made_at)
         recorder.add_tick(ticks.sample, desired, command)
         for source, report in ticks.updates():
             recorder.add_report(ticks.sample.time, source, report, elapsed)
+        supervision = ticks.loop.supervision
+        recorder.flags.add_tick(elapsed, supervision.flags, supervision.reaction)
         if watch is not None:
-            watch(ticks.loop.supervision)
+            watch(supervision)
         if (error := stop.update(ticks.sample.time)) is not None:
             error.recording = recording()
             raise error
@@ -108,6 +115,17 @@ def run_experiment(
         if progress is not None and int(now) > int(elapsed):
             progress(now, reference.duration)
     return recording()
+
+
+def _check_reference(reference: Reference) -> None:
+    """Check what is read when a run ends, before its motors move."""
+    duration: Any = getattr(reference, "duration", None)
+    if check_time("reference.duration", duration) <= 0.0:
+        raise SignalError("reference.duration", duration, "a time above 0 s")
+    segments = getattr(reference, "segments", None)
+    if not isinstance(segments, Sequence) or not all(isinstance(s, Segment) for s in segments):
+        allowed = "a sequence of tautscope.references.Segment, which may be empty: ()"
+        raise SignalError("reference.segments", segments, allowed)
 
 
 class _MotionStop:

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config, check_config
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import Actuators
 from tautscope.loop.kinematics import build_kinematics, rotation_matrix
 from tautscope.loop.measurement import Measurement, Pose, Tip
 from tautscope.loop.rig import Sample
+from tautscope.loop.signal_checks import as_numbers, check_signal, check_time
 
 EVERY = 5
 """Control periods from one measurement to the next."""
@@ -28,7 +29,7 @@ class PlayRig:
 
     Args:
         config: With [[dof]].
-        slack: w (n,) or (n, k) [m or rad]; by default half of each width limit.
+        slack: w (n,), (n, k) or one for all [m or rad]; by default half of each width limit.
         gains: (n,) or one for all.
         zeros: (n,) [m or rad] or one for all.
         delay: Time from a measurement to its arrival, up to a control period more [s].
@@ -43,6 +44,7 @@ class PlayRig:
 
     Raises:
         ConfigError: The configuration has no [[dof]].
+        SignalError: An argument is not as described, or a slack below 0.
     """
 
     def __init__(
@@ -59,13 +61,18 @@ class PlayRig:
             raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
         self.config, self.control_period = config, config.control.period
         self._limits = np.array([dof.width_limit for dof in config.dof])
-        widths = self._limits / 2 if slack is None else np.asarray(slack, dtype=np.float64)
-        self._half = widths.reshape(len(self._limits), -1) / 2
-        self._gains, self._zeros, self._delay = np.asarray(gains), np.asarray(zeros), delay
+        count = len(self._limits)
+        widths = self._limits / 2 if slack is None else _of_each("slack", slack, count, most=2)
+        if (widths < 0.0).any():
+            raise SignalError("slack", widths.tolist(), "widths of at least 0 m or rad")
+        self._half = widths.reshape(count, -1) / 2
+        self._gains, self._zeros = _of_each("gains", gains, count), _of_each("zeros", zeros, count)
+        self._delay = check_time("delay", delay)
         self._actuators = None if config.actuators is None else Actuators(config)
         self.kinematics = build_kinematics(config)
         self._is_apart = [dof.name in config.kinematics.without for dof in config.dof]
         self._seed = seed
+        self._plays: NDArray[np.float64] | None = None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {', '.join(dof.name for dof in self.config.dof)}>"
@@ -78,10 +85,22 @@ class PlayRig:
         return self.step(rest if self._actuators is None else self._actuators.motors(rest))
 
     def step(self, command: ArrayLike) -> Sample:
-        """Move to a command (n,) [m or rad], or positions (m,) of the motors."""
-        applied = np.asarray(command, dtype=np.float64)
-        found = applied if self._actuators is None else self._actuators.dofs(applied)
-        motors = np.asarray(found, dtype=np.float64)[:, None]
+        """Move to a command (n,) [m or rad], or positions (m,) of the motors.
+
+        Raises:
+            SignalError: These are not as many finite numbers, or there was no `reset`.
+        """
+        if self._plays is None:
+            raise SignalError("rig", "a command before reset()", "a rig after reset()")
+        if self._actuators is None:
+            applied = motors = check_signal("command", command, (len(self._half),))
+        else:
+            applied = as_numbers("command", command, "positions of the motors")
+            found = self._actuators.dofs(applied)
+            if found is None:
+                raise SignalError("actuators.map", "no way back", "a class with dofs(motors)")
+            motors = found
+        motors = motors[:, None]
         self._plays = np.clip(self._plays, motors - self._half, motors + self._half)
         tip = self._zeros + self._gains * self._plays.mean(axis=1)
         self.ticks += 1
@@ -112,3 +131,11 @@ class PlayRig:
         yield Pose(position + noise(0.0, settings.position_deviation, 3), time, rotation @ turned)
         if any(self._is_apart):
             yield Tip(np.where(self._is_apart, values, np.nan), time, sensor=1)
+
+
+def _of_each(field: str, values: ArrayLike, count: int, *, most: int = 1) -> NDArray[np.float64]:
+    """Finite numbers (count,), of at most two dimensions (count, k); or one for all."""
+    array = as_numbers(field, values, f"{count} finite numbers")
+    if array.ndim == 0:
+        array = np.full(count, array)
+    return check_signal(field, array, (count, *(max(k, 1) for k in array.shape[1:most])))

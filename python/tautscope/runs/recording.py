@@ -23,6 +23,7 @@ Table = NDArray[np.void]
 
 FEATURES = ("a_x", "a_y", "b_x", "b_y")
 """The order of every (4,) array of features."""
+_FLAGS = {"True": True, "False": False}
 
 
 def _names(groups: list[str], members: list[str]) -> list[str]:
@@ -79,7 +80,7 @@ class Recording:
         trace: Structured array, one row per control tick: `time` [s, the rig's clock]; per DOF
             [m or rad] `reference_*`, `command_*` (given at this time), `applied_*` and
             `true_*` (at this time; truth is NaN if the rig has none), `estimate_*`,
-            `delta_minus_*`, `delta_plus_*` (of the newest frame); `status` of that frame.
+            `delta_minus_*`, `delta_plus_*` (after the newest frame); `status` of that frame.
         frames: Structured array, one row per image: `captured_at` (of a measurement its stamp less
             `measurement.delays`), `arrived_at` [s], `sequence`, `status`, `valid`; per DOF
             `estimate_*`, `predicted_*`, `true_*` (at the capture time, interpolated),
@@ -253,7 +254,9 @@ def _read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
         columns = list(zip(*rows, strict=True)) or [()] * len(names)
         for name, column in zip(names, columns, strict=True):
             is_flag = dtype[name].kind == "b"
-            table[name] = [cell == "True" for cell in column] if is_flag else column
+            table[name] = [_FLAGS[cell] for cell in column] if is_flag else column
+    except KeyError as error:
+        raise RecordError(f"{path}: {name}", error.args[0], "True or False") from None
     except (ValueError, OverflowError) as error:
         raise RecordError(str(path), str(error), "a number in every cell") from None
     return table

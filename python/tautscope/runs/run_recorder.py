@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.dof import Dof
+from tautscope.loop.construction import build_loop
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Sample
@@ -73,8 +73,8 @@ class _RowBuffer:
 class RunRecorder:
     """Collects the rows of a `Recording` in the order of events.
 
-    Until the first frame the contact offsets are those of the configuration. About the newest
-    `most` rows of each table are kept, or all.
+    Until the first update the contact offsets are those with which the loop starts. About the
+    newest `most` rows of each table are kept, or all.
     """
 
     def __init__(self, config: Config, most: int | None = None) -> None:
@@ -84,8 +84,8 @@ class RunRecorder:
         self._frames = _RowBuffer(self._columns, most)
         self._unknown = (np.nan,) * len(config.dofs)
         self._estimate = self._unknown
-        own = config.dof or [config[dof] for dof in Dof]
-        self._deltas = *(dof.delta_minus for dof in own), *(dof.delta_plus for dof in own)
+        loop = build_loop(config)
+        self._deltas = *loop.delta_minus, *loop.delta_plus
         self._status = "none"
 
     def add_tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
