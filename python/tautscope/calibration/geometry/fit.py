@@ -13,7 +13,12 @@ from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
-from tautscope.calibration.geometry.values import Value, changes_and_stds, estimated_values
+from tautscope.calibration.geometry.values import (
+    DELAY,
+    Value,
+    changes_and_stds,
+    estimated_values,
+)
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.kinematics import Floats
@@ -82,7 +87,8 @@ def fit(
 
     Args:
         recording: From `sweep`, or of your own motors and features.
-        config: The configuration with a rough geometry, within about 5 mm and 5 deg.
+        config: The configuration with a rough geometry, within about 5 mm and 5 deg; its
+            `camera.source.delay` has been subtracted from the stamps.
         intrinsics: ``none``, ``focal`` (one factor of both focal lengths) or ``all``.
         band_distance: Measured distance of the bands' centres [m], in place of the drive's scale.
 
@@ -137,7 +143,7 @@ def _result(
         warnings.append(short)
     values = estimated_values(model, solution, active)
     changes, stds = changes_and_stds(model.config, model.configured(solution.z), values)
-    delay = next(value for value in values if value.name == "camera.source.delay")
+    delay = next(value for value in values if value.name == DELAY)
     if delay.after < -2 * delay.std:
         warnings.append(
             f"Images are stamped {-delay.after * 1e3:.0f} ms before the motors' clock: "
