@@ -14,14 +14,20 @@ from tautscope.calibration.bands import labels
 from tautscope.calibration.bands.labels import LEAST_AREA, LabelledImage, Mask
 from tautscope.calibration.colour import fit_discriminant
 from tautscope.calibration.images import Image, to_bgr
-from tautscope.calibration.motion import ImageRecorder, Progress, Sines, article_sines
+from tautscope.calibration.motion import (
+    ImageRecorder,
+    Progress,
+    Sines,
+    article_sines,
+    feasible_periods,
+)
 from tautscope.config import Config
 from tautscope.errors import CalibrationError, FieldError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
 
 DURATION = 10.0
-"""Duration of the motion [s]."""
+"""Duration of the motion, unless the motors are slow [s]."""
 MOST_IMAGES = 60
 _SHARE = (1.0, 0.0, 0.6)
 """Amplitude relative to that of the experiment."""
@@ -88,8 +94,10 @@ class ImageSequence(ImageRecorder):
 def record_motion(rig: Rig, config: Config, progress: Progress | None = None) -> ImageSequence:
     """Move insertion and bending, as `move_rig`, within the experiment's range; keep images."""
     centre, amplitude = article_sines(config)
+    amplitude, turns = amplitude * _SHARE, np.array(_TURNS)
+    periods = feasible_periods(config, amplitude, DURATION / turns)
     found = ImageSequence(config)
-    motion = Sines(centre, amplitude * _SHARE, DURATION / np.array(_TURNS), DURATION)
+    motion = Sines(centre, amplitude, periods, float((periods * turns).max()))
     found.move(rig, config, motion, progress)
     return found
 
