@@ -253,8 +253,14 @@ def test_a_malformed_record_is_refused() -> None:
         replace(recording, captured_at=recording.captured_at * np.nan)
     with pytest.raises(SignalError, match="captured_at: got 'a time before the last'"):
         replace(recording, captured_at=recording.captured_at[::-1])
-    with pytest.raises(FieldError, match="band_distance"):
-        fit(recording, told(), band_distance=0.001)
+    with pytest.raises(SignalError, match="time: got 'no time'"):
+        replace(recording, time=np.empty(0), motors=np.empty((0, 3)))
+    for name in ("time", "motors", "captured_at", "features"):
+        with pytest.raises(SignalError, match=f"^{name}: got"):
+            replace(recording, **{name: ["a"]})
+    for distance in (0.001, np.nan, np.inf, "x", [0.01]):
+        with pytest.raises(FieldError, match=r"^band_distance: got"):
+            fit(recording, told(), band_distance=distance)
 
 
 class _Rig:

@@ -25,6 +25,7 @@ from tautscope.config import Config
 from tautscope.errors import CalibrationError, FieldError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
+from tautscope.loop.signal_checks import as_numbers
 
 DURATION = 10.0
 """Duration of the motion, unless the motors are slow [s]."""
@@ -146,7 +147,8 @@ def find_moving_bands(
         FieldError: Numbers of images, times and positions differ, or are too few.
         CalibrationError: Nothing moved, or no two bands were found.
     """
-    stamps, motors = np.asarray(times, np.float64), np.asarray(positions, np.float64)
+    stamps = as_numbers("times", times, "numbers, one per image")
+    motors = as_numbers("positions", positions, "numbers, one row per image")
     if len(images) < LEAST_IMAGES:
         raise FieldError("images", len(images), f"at least {LEAST_IMAGES}")
     for name, array, shape in (

@@ -22,6 +22,7 @@ from tautscope.calibration.geometry.values import (
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.kinematics import Floats
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector
 
@@ -97,10 +98,11 @@ def fit(
             too little motion.
         FieldError: An option has a value that is not allowed.
     """
-    if band_distance is not None and not (
-        np.isfinite(band_distance) and band_distance > config.instrument.band_length
-    ):
-        raise FieldError("band_distance", band_distance, "a length above instrument.band_length")
+    if band_distance is not None:
+        allowed = "a length above instrument.band_length"
+        distance = as_numbers("band_distance", band_distance, allowed)
+        if distance.shape or not config.instrument.band_length < distance < np.inf:
+            raise FieldError("band_distance", band_distance, allowed)
     active = estimated(intrinsics, by_band_distance=band_distance is not None)
     check_record(recording, config)
     model = Model(config, recording.with_bands(), band_distance)

@@ -22,6 +22,7 @@ from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import black, brightness, white
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.vision import Detection, MarkerDetector
 
 IMAGE_PERIOD = 0.08
@@ -112,19 +113,21 @@ class Recording:
     saturated: float = 0.0
 
     def __post_init__(self) -> None:
-        ticks, images = len(self.time), len(self.captured_at)
+        ticks, images = np.size(self.time), np.size(self.captured_at)
         for name, shape in (
             ("time", (ticks,)),
             ("motors", (ticks, 3)),
             ("captured_at", (images,)),
             ("features", (images, 4)),
         ):
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise SignalError(name, f"an array {found}", f"shape {shape}")
+            values = as_numbers(name, getattr(self, name), f"numbers, shape {shape}")
+            if values.shape != shape:
+                raise SignalError(name, f"an array {values.shape}", f"shape {shape}")
         for name in ("time", "motors", "captured_at"):
             if not np.isfinite(getattr(self, name)).all():
                 raise SignalError(name, "a number that is not finite", "finite numbers")
+        if not ticks:
+            raise SignalError("time", "no time", "that of each position of the motors")
         if (np.diff(self.captured_at) < 0).any():
             raise SignalError("captured_at", "a time before the last", "times in order")
         if (np.diff(self.time) <= 0).any():
