@@ -7,7 +7,7 @@ from tautscope.calibration.robot import RobotFit
 from tautscope.commands import robot_calibration
 from tautscope.commands.calibrate_latency import result
 from tautscope.config import Config, load_config
-from tautscope.errors import CalibrationError
+from tautscope.errors import CalibrationError, ConfigError
 
 KEY = "camera.source.delay"
 
@@ -75,11 +75,22 @@ def test_no_answer_is_an_error(found: DelayEstimate, named: str) -> None:
         result(found, known(0.02), {})
 
 
-@pytest.mark.parametrize(("delay", "is_early"), [(-0.2, True), (-0.02, False), (0.2, False)])
-def test_stamps_of_a_robot_that_are_early_are_named(delay: float, is_early: bool) -> None:
+@pytest.mark.parametrize(
+    ("delay", "is_early", "is_old"),
+    [(-0.2, True, False), (-0.02, False, False), (0.2, False, False), (0.4, False, True)],
+)
+def test_delays_of_a_robot_that_cannot_be_configured_are_named(
+    delay: float, is_early: bool, is_old: bool
+) -> None:
     values = {"measurement.delays[0]": delay, "dof.x.gain": 1.0, "dof.x.slack": 0.1}
     std = {"measurement.delays[0]": 0.02, "dof.x.gain": 0.01}
     config = axes(1, names=["x"], width_limit=1.0)
     result = robot_calibration.result("latency", RobotFit(values, std, {}, ()), config)
     assert result.values == {"measurement.delays": [max(delay, 0.0)]}
     assert any("stamped 200 ms before" in note for note in result.notes) == is_early
+    asked = "set safety.frame_age to more than 0.40 s before --write"
+    assert any(asked in note for note in result.notes) == is_old
+    if is_old:  # and then it can be written
+        with pytest.raises(ConfigError, match=r"safety\.frame_age"):
+            config.replace(**result.values)
+        assert config.replace(**{"safety.frame_age": 0.41}, **result.values)
