@@ -60,7 +60,7 @@ CONDITIONS = {
     "behind the field stop": Condition(("partial",)),
     "touching": Condition(poses="touching"),
     "touching, defocused": Condition(("touching",), poses="touching"),
-    "highlights, debris, smoke, inset": Condition(("highlights", "debris", "smoke", "inset")),
+    "highlights + debris + smoke + inset": Condition(("highlights", "debris", "smoke", "inset")),
     "three at random": Condition(others=3),
     "no instrument": Condition(("no_instrument",)),
     "no instrument, three at random": Condition(("no_instrument",), others=3),

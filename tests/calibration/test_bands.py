@@ -142,6 +142,8 @@ def test_malformed_input_is_refused() -> None:
         find_moving_bands(images, TIMES, positions[:-1])
     with pytest.raises(FieldError, match="times"):
         find_moving_bands(images, TIMES[:-1], positions)
+    with pytest.raises(FieldError, match=r"^times: got"):
+        find_moving_bands(images, ["a"], positions)
 
 
 def test_bands_grow_from_clicks() -> None:

@@ -13,9 +13,14 @@ from boards import CONFIG, rendered
 from refused import failed
 from tautscope.calibration.camera.camera_info import read_camera_info
 from tautscope.cli import main
-from tautscope.config import load_config
+from tautscope.commands import board_images
+from tautscope.config import CameraConfig, load_config
 from tautscope.config.load import config_file
 from tautscope.config.placeholders import placeholders
+from tautscope.errors import CameraError
+from tautscope.hardware.cameras import CameraState
+from tautscope.hardware.cameras import Capture as CapturedFrame
+from tautscope.loop.rig import Frame
 from tautscope.twin.drawn_rig import draw_rig
 
 Capture = pytest.CaptureFixture[str]
@@ -135,6 +140,43 @@ def test_refusals_write_nothing(capsys: Capture, tmp_path: Path, files: list[str
     assert "a video file that FFmpeg reads" in failed(capsys, *COMMAND, str(text))
     assert set(tmp_path.iterdir()) == before
     assert rig.read_text() == "[camera]\nwidth = 720\n"
+
+
+class Interrupted:
+    """A camera without images, twice: the second time it stays away."""
+
+    ages = iter([0.1, 2.1, 2.2, None, 2.5, 4.9, 5.1])
+
+    def __init__(self, config: CameraConfig) -> None:
+        self._age: float | None = None
+
+    def __enter__(self) -> "Interrupted":
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        pass
+
+    def newest(self) -> CapturedFrame | None:
+        self._age = next(self.ages)
+        image = np.zeros((576, 720, 3), np.uint8)
+        return CapturedFrame(Frame(image, 0.0, 0), 0.0) if self._age is None else None
+
+    @property
+    def state(self) -> CameraState:
+        assert self._age is not None
+        return CameraState(age=self._age, trouble=f"no frame for {self._age} s" * (self._age > 2))
+
+
+def test_a_lost_camera_is_named_and_ends_the_calibration(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(board_images, "Camera", Interrupted)
+    images = board_images.live_images(CONFIG, 60.0).images
+    assert next(images).shape == (576, 720, 3)
+    with pytest.raises(CameraError, match=r"no frame for 5\.1 s.*lost_timeout, 5 s"):
+        next(images)
+    told = [line for line in capsys.readouterr().err.splitlines() if "camera:" in line]
+    assert told == ["camera: no frame for 2.1 s", "camera: no frame for 2.5 s"]
 
 
 def test_another_board_is_not_found(capsys: Capture, files: list[str]) -> None:

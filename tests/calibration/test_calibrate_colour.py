@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from refused import failed
 from tautscope.calibration.bands.motion import ImageSequence, record_motion
+from tautscope.calibration.motion import article_sines
 from tautscope.cli import main
-from tautscope.config import load_config
+from tautscope.config import Config, load_config
+from tautscope.dof import Dof
+from tautscope.loop.rig import Sample
 from tautscope.loop.vision import MarkerDetector
 from tautscope.twin.drawn_rig import draw_rig
 from tautscope.twin.rig import Twin
@@ -57,6 +60,42 @@ def test_the_twin_is_calibrated(capsys: Capture, tmp_path: Path) -> None:
     detection = detector.detect(sample.frame.image)
     assert detection.valid
     assert detection.features == pytest.approx(sample.frame.true_features, abs=2)
+
+
+class Still:
+    """A rig that records its commands."""
+
+    def __init__(self, config: Config) -> None:
+        self.control_period, self.commands = config.control.period, [article_sines(config)[0]]
+
+    def reset(self) -> Sample:
+        return Sample(0.0, self.commands[0])
+
+    def step(self, command: np.ndarray) -> Sample:
+        self.commands.append(np.array(command))
+        return Sample((len(self.commands) - 1) * self.control_period, self.commands[-1])
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("slow", ["safety.reference_speed", "drives"])
+def test_the_whole_motion_is_within_the_speed_of_the_motors(slow: str) -> None:
+    config = load_config("bench")
+    if slow == "drives":
+        config = config.replace(**{"drives.bending.speed_limit": 0.2})
+    else:
+        periods = {f"experiment.{dof}.period": 60.0 for dof in ("insertion", "rotation", "bending")}
+        config = config.replace(**{slow: (0.003, 4.0, 0.2), **periods})
+    rig = Still(config)
+    record_motion(rig, config)
+    commands, (_, amplitude) = np.array(rig.commands), article_sines(config)
+    speed = np.abs(np.diff(commands, axis=0)).max(axis=0) / config.control.period
+    assert config.drives is not None
+    limits = [config.drives[dof].speed_limit for dof in Dof]
+    assert (speed <= 0.5 * np.minimum(config.safety.reference_speed, limits)).all()
+    moved = np.ptp(commands, axis=0)
+    assert moved[[0, 2]] == pytest.approx(2 * amplitude[[0, 2]] * [1.0, 0.6], rel=0.02)
 
 
 def test_a_video_and_an_image_with_clicks_agree(

@@ -103,6 +103,14 @@ def test_a_lens_that_folds_is_refused() -> None:
         to_loop_model(lens)
 
 
+def test_a_lens_that_no_pinhole_resembles_is_refused() -> None:
+    """Its angles grow with the radius, but the rational gain that is nearest is 20 px off."""
+    distortion = (0.10, -0.07, 0.04, -0.004)
+    lens = Intrinsics(SIZE, "fisheye", (235.0, 247.0), (360.0, 288.0), distortion)
+    with pytest.raises(CalibrationError, match=r"nearest pinhole of the loop differ by \d+ px"):
+        to_loop_model(lens)
+
+
 def test_a_pinhole_is_kept() -> None:
     converted, error = to_loop_model(pinhole())
     assert error == 0

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
-from tautscope.calibration.delay import Probe, _combined, _move_at_once, estimate_delay
+from tautscope.calibration.delay import (
+    DelayEstimate,
+    Probe,
+    _combined,
+    _move_at_once,
+    estimate_delay,
+)
 from tautscope.calibration.delay_probes import Signal
 from tautscope.calibration.tip_states import tip_states
 from tautscope.config import load_config
@@ -174,6 +180,20 @@ def test_signals_are_checked() -> None:
         estimate_delay(times, positions[1:], times, positions)
     with pytest.raises(SignalError, match="finite positions"):
         estimate_delay(times, positions + np.nan, times, positions)
+    for index, name in enumerate(("times", "motors", "stamps", "tips")):
+        arrays: list[object] = [times, positions, times, positions]
+        for wrong in (["a"], [[1.0], [1.0, 2.0]]):
+            arrays[index] = wrong
+            with pytest.raises(SignalError, match=f"^{name}: got"):
+                estimate_delay(*arrays)
+    for limit in (0.0, -1.0, np.nan, np.inf, "a"):
+        with pytest.raises(SignalError, match=r"^limit: got"):
+            estimate_delay(times, positions, times, positions, limit)
+    for features in ("x", np.zeros((3, 3)), np.zeros(4)):
+        with pytest.raises(SignalError, match=r"^features: got"):
+            tip_states(features, CONFIG)
+    with pytest.raises(SignalError, match=r"^stamps: got"):
+        DelayEstimate(0.1).motor_time(["a"], 0.0)
 
 
 def test_no_more_positions_are_used_than_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,10 +10,8 @@ from calibration.records import Case, Instrument
 from simulated_motion import DELAY, actual, simulate, told
 from tautscope.calibration.geometry import GeometryFit, Recording, fit, sweep
 from tautscope.calibration.geometry.checks import shortness
-from tautscope.calibration.geometry.recording import Recorder
 from tautscope.config import Config
 from tautscope.errors import FieldError, MotionHeldError, RecordError, SignalError
-from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Sample
 from tautscope.twin import Twin
 from tautscope.twin.drawn_rig import draw_geometry
@@ -64,6 +62,20 @@ def test_a_known_geometry_is_found_within_its_standard_deviations() -> None:
     assert angle(found.config, rig) < 0.3
     assert across(found.config, rig) < 0.3e-3
     assert found.residual_px < 0.3
+
+
+@pytest.mark.parametrize(("before", "error"), [(0.1, 0.0), (0.1, 0.35)])
+def test_a_configured_delay_is_part_of_the_result(before: float, error: float) -> None:
+    """The camera has subtracted it from its stamps, which are also too early by an error [s]."""
+    recording, key = simulate()[0], "camera.source.delay"
+    stamps = recording.captured_at - before - error
+    found = fit(replace(recording, captured_at=stamps), told().replace(**{key: before}))
+    value = next(each for each in found.values if each.name == key)
+    assert value.before == before
+    assert found.changes[key] == found.config.camera.source.delay == max(value.after, 0.0)
+    assert abs(value.after - (DELAY - error)) < 3 * found.std[key]
+    early = any("before the motors' clock" in warning for warning in found.warnings)
+    assert early == (error > DELAY)
 
 
 def test_a_measured_distance_sets_the_scale() -> None:
@@ -241,8 +253,14 @@ def test_a_malformed_record_is_refused() -> None:
         replace(recording, captured_at=recording.captured_at * np.nan)
     with pytest.raises(SignalError, match="captured_at: got 'a time before the last'"):
         replace(recording, captured_at=recording.captured_at[::-1])
-    with pytest.raises(FieldError, match="band_distance"):
-        fit(recording, told(), band_distance=0.001)
+    with pytest.raises(SignalError, match="time: got 'no time'"):
+        replace(recording, time=np.empty(0), motors=np.empty((0, 3)))
+    for name in ("time", "motors", "captured_at", "features"):
+        with pytest.raises(SignalError, match=f"^{name}: got"):
+            replace(recording, **{name: ["a"]})
+    for distance in (0.001, np.nan, np.inf, "x", [0.01]):
+        with pytest.raises(FieldError, match=r"^band_distance: got"):
+            fit(recording, told(), band_distance=distance)
 
 
 class _Rig:
@@ -285,14 +303,3 @@ def test_the_seed_decides_how_the_twin_differs() -> None:
     assert one == draw_geometry(told(), 5) != other
     assert one.camera.cx == told().camera.cx
     assert 0 <= one.twin.sensor.stamp_error <= 0.2
-
-
-@pytest.mark.parametrize("pixel_format", ["nv12", "i420", "bgr"])
-def test_the_share_of_saturated_pixels_is_that_of_the_image(pixel_format: str) -> None:
-    config = told().replace(**{"camera.pixel_format": pixel_format})
-    image = np.full(FrameLayout(config.camera).shape, 128, np.uint8)
-    image[: config.camera.height, 3] = 255
-    recorder = Recorder(config)
-    recorder.add_tick(0.0, np.zeros(3))
-    recorder.add_image(image, 0.0)
-    assert recorder.recording().saturated == pytest.approx(1 / config.camera.width)

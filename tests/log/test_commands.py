@@ -11,8 +11,10 @@ import pytest
 from drawn import BACKLASH, with_half_images, with_periods
 from recorded import record
 from rosbags.highlevel import AnyReader
+from tautscope.calibration.delay import DelayEstimate
 from tautscope.cli import main
 from tautscope.config import Config, dump_config
+from tautscope.log import alignment
 from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.runs.recording import Recording, per_dof
@@ -204,6 +206,23 @@ def test_align_finds_the_delay_of_a_log(
     assert found["delay"] is None
     assert main(["align", str(recorded[0])]) == 1
     assert "No answer: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("delay", "remedy"),
+    [(-0.01, "camera.source.delay = 0.000"), (-0.1, "check camera.source.clock")],
+)
+def test_align_advises_no_delay_below_zero(
+    capsys: Capture,
+    recorded: Recorded,
+    monkeypatch: pytest.MonkeyPatch,
+    delay: float,
+    remedy: str,
+) -> None:
+    found = DelayEstimate(delay, 0.02, 0.0, 0.0)
+    monkeypatch.setattr(alignment, "align_recording", lambda *_: found)
+    assert main(["align", str(recorded[0])]) == 0
+    assert remedy in capsys.readouterr().out
 
 
 def test_a_late_video_is_aligned(

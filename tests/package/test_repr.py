@@ -127,6 +127,7 @@ def test_values_are_printed_in_their_display_units() -> None:
 def test_a_sample_and_a_frame_without_contents() -> None:
     assert "no frame" in repr(Sample(0.0, np.zeros(3)))
     assert "3 x 2" in repr(Frame(np.zeros((2, 3, 3), np.uint8), 0.0, 0))
+    assert "720 x 576" in repr(Frame(np.zeros((864, 720), np.uint8), 0.0, 0))
 
 
 def test_every_public_object_has_a_text_of_its_own() -> None:

@@ -47,13 +47,25 @@ def test_what_was_calibrated_on_the_twin_stays() -> None:
         serial_numbers={"twin": "5"},
         std={"camera.fx": 0.5, "camera.distortion[0]": 0.01},
     )
-    calibrated = told.replace(**{"camera.fx": 430.0, "calibration.camera": record})
+    calibrated = told.replace(**{"camera.fx": 430.0, "calibration.geometry": record})
     again = draw_rig(calibrated, 5)
     assert again.camera.fx == 430
     assert again.camera.distortion == told.camera.distortion
     assert again.camera.cx == actual.camera.cx
     assert again.twin == actual.twin
     assert draw_rig(calibrated, 6).camera.fx != 430
+
+
+def test_a_fisheye_that_was_calibrated_on_the_twin_stays() -> None:
+    """Its distortion is that of the pinhole nearest to it, and has no standard deviations."""
+    record = CalibrationRecord(
+        date="2026-01-01T00:00:00+00:00",
+        serial_numbers={"twin": "5"},
+        std={f"camera.{key}": 0.1 for key in ("fx", "fy", "cx", "cy")},
+    )
+    distortion = (-0.1, 0.02, 0.0, 0.0, 0.003, 0.01, 0.0, 0.0)
+    changes = {"camera.distortion": distortion, "calibration.camera": record}
+    assert draw_rig(load_config().replace(**changes), 5).camera.distortion == distortion
 
 
 def test_other_pixels_than_those_of_the_twin_are_refused() -> None:

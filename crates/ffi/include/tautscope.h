@@ -247,6 +247,8 @@ enum TautscopeRejection
     TAUTSCOPE_REJECTION_AMBIGUOUS = 8,
     // The bands are too far from their predicted positions.
     TAUTSCOPE_REJECTION_ELSEWHERE = 9,
+    // A band was found alone, and where the instrument is, is not known.
+    TAUTSCOPE_REJECTION_ALONE = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

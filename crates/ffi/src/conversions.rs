@@ -69,6 +69,7 @@ impl From<Option<vision::Rejection>> for TautscopeRejection {
             Some(vision::Rejection::NoInstrument) => Self::NoInstrument,
             Some(vision::Rejection::Ambiguous) => Self::Ambiguous,
             Some(vision::Rejection::Elsewhere { .. }) => Self::Elsewhere,
+            Some(vision::Rejection::Alone) => Self::Alone,
         }
     }
 }

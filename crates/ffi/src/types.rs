@@ -102,6 +102,8 @@ pub enum TautscopeRejection {
     Ambiguous = 8,
     /// The bands are too far from their predicted positions.
     Elsewhere = 9,
+    /// A band was found alone, and where the instrument is, is not known.
+    Alone = 10,
 }
 
 /// A camera image in the caller's memory. Lines are `stride` bytes apart; width, height and format are those of `[camera]`.

@@ -140,7 +140,6 @@ impl Settings {
                 least_explained: least.least_explained,
                 ..self.blur
             },
-            least_edges_alone: f64::INFINITY,
             is_unlocated: true,
             ..self.clone()
         }

@@ -34,6 +34,7 @@ from tautscope.calibration.delay_probes import Fit, Signal, fit_model, fit_turni
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
 from tautscope.loop.kinematics import Floats
+from tautscope.loop.signal_checks import as_numbers, check_time
 
 LIMIT = 5.0
 """Largest magnitude of a delay that is searched, unless another is given [s]."""
@@ -121,7 +122,7 @@ class DelayEstimate:
 
     def motor_time(self, stamps: ArrayLike, first: float) -> Floats:
         """Times of the motors' clock (n,) [s] that images stamped (n,) [s] show."""
-        values = np.asarray(stamps, dtype=np.float64)
+        values = as_numbers("stamps", stamps, "times")
         return values - self.delay - self.drift * (values - first)
 
     def to_json(self) -> dict[str, Any]:
@@ -151,8 +152,11 @@ def estimate_delay(
         The estimate; `DelayEstimate.reason` says why there is none.
 
     Raises:
-        SignalError: Times do not increase, shapes do not match, or a motor position is not finite.
+        SignalError: Times do not increase, shapes do not match, a motor position is not finite, or
+            the limit is not a time above 0.
     """
+    if not check_time("limit", limit) > 0:
+        raise SignalError("limit", limit, "a time above 0 s")
     times, motors, stamps, tips = _checked(times, motors, stamps, tips)
     step = -(-len(times) // MOST_POSITIONS)
     times, motors = times[::step], motors[::step]
@@ -331,7 +335,8 @@ def _line(
 def _checked(
     times: ArrayLike, motors: ArrayLike, stamps: ArrayLike, tips: ArrayLike
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    arrays = [np.asarray(each, dtype=np.float64) for each in (times, motors, stamps, tips)]
+    given = {"times": times, "motors": motors, "stamps": stamps, "tips": tips}
+    arrays = [as_numbers(name, each, "an array of numbers") for name, each in given.items()]
     for name, clock, signal, values in (
         ("times", arrays[0], "motors", arrays[1]),
         ("stamps", arrays[2], "tips", arrays[3]),

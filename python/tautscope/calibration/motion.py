@@ -77,21 +77,32 @@ def article_sines(config: Config) -> tuple[Floats, Floats]:
     return np.array([each.centre for each in sines]), np.array([each.amplitude for each in sines])
 
 
+def feasible_periods(config: Config, amplitude: Floats, periods: Floats) -> Floats:
+    """Periods (n,) [s] of sines of amplitudes (n,), longer where they are too fast.
+
+    That is where the speed would exceed half of `safety.reference_speed` and of the drives' limits,
+    or of `dof.speed`.
+    """
+    speed = np.array([each.speed or 2 * each.width_limit for each in config.dof])
+    if not config.dof:
+        speed = np.array(config.safety.reference_speed)
+        if config.drives is not None:
+            speed = np.minimum(speed, [config.drives[dof].speed_limit for dof in Dof])
+    return np.maximum(periods, 2 * np.pi * amplitude / (_SPEED_SHARE * speed))
+
+
 def sweep_motion(config: Config, duration: float = DURATION) -> Sines:
     """The motion that calibrates a rig: sines with periods that do not repeat within it.
 
     Centres and amplitudes are those of the experiment; of degrees of freedom in [[dof]] the middle
-    of their range and 0.4 of it. Periods are longer where the speed would exceed half of
-    `safety.reference_speed` and of the drives' limits, or of `dof.speed`.
+    of their range and 0.4 of it. Periods are those of `feasible_periods`.
 
     Raises:
         ConfigError: A degree of freedom has no range.
     """
     if not config.dof:
         centre, amplitude = article_sines(config)
-        speed, periods = np.array(config.safety.reference_speed), np.array(_PERIODS)
-        if config.drives is not None:
-            speed = np.minimum(speed, [config.drives[dof].speed_limit for dof in Dof])
+        periods = np.array(_PERIODS)
     else:
         for index, each in enumerate(config.dof):
             if each.range is None:
@@ -99,10 +110,8 @@ def sweep_motion(config: Config, duration: float = DURATION) -> Sines:
                 raise ConfigError(f"dof[{index}].range", None, allowed)
         low, high = np.array([each.range for each in config.dof], dtype=np.float64).T
         centre, amplitude = (low + high) / 2, SHARE * (high - low)
-        speed = np.array([each.speed or 2 * each.width_limit for each in config.dof])
         periods = _LONGEST * _RATIO ** np.arange(len(config.dof))
-    least = 2 * np.pi * amplitude / (_SPEED_SHARE * speed)
-    return Sines(centre, amplitude, np.maximum(periods, least), duration)
+    return Sines(centre, amplitude, feasible_periods(config, amplitude, periods), duration)
 
 
 def move_rig(

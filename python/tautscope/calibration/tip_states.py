@@ -5,8 +5,10 @@ from numpy.typing import ArrayLike
 
 from tautscope.config import Config
 from tautscope.dof import Dof
+from tautscope.errors import SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.kinematics import Floats
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.vision import workspace_starts
 
 _PIXELS = np.full(4, 0.5)  # standard deviation of a feature for the fit [px]
@@ -24,12 +26,18 @@ def tip_states(features: ArrayLike, config: Config) -> Floats:
         (n, 3) [m, rad, rad]; NaN for images without both bands, and for a DOF whose standard
         deviation for 1 px of noise exceeds its `observable_deviation`: the rotation of a straight
         instrument.
+
+    Raises:
+        SignalError: The features are not such an array of numbers.
     """
+    allowed = "an array (n, 4) of numbers"
+    values = as_numbers("features", features, allowed)
+    if values.ndim != 2 or values.shape[1] != 4:
+        raise SignalError("features", f"array {values.shape}", allowed)
     model = build_feature_model(config)
     starts, spread = workspace_starts(config)
     spread = _BROAD * spread
     limits = np.array([config[dof].observable_deviation for dof in Dof])
-    values = np.asarray(features, dtype=np.float64)
     states = np.full((len(values), 3), np.nan)
     for row, measured in zip(states, values, strict=True):
         if not np.isfinite(measured).all():

@@ -53,7 +53,9 @@ def _run(options: argparse.Namespace) -> int:
         found = align_recording(log.recording(), options.within)
         camera_delay = log.config.camera.source.delay + found.delay
         document["camera_delay"] = camera_delay if found.is_known else None
-        remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
+        remedy = f"To correct it, set camera.source.delay = {max(camera_delay, 0.0):.3f}"
+        if camera_delay < -2 * found.delay_std:
+            remedy = "The images are stamped before they are captured: check camera.source.clock"
     else:
         config = arguments.article_config(options.config)
         motors = positions.read_positions(options.motors, options.units, config)

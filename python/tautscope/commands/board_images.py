@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig, Config
+from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera
 from tautscope.hardware.video import open_video_file, read_video
 
@@ -60,20 +61,30 @@ def file_images(files: Sequence[Path]) -> BoardImages:
 
 
 def live_images(config: Config, seconds: float) -> BoardImages:
-    """Images of the camera of a configuration, for at most so many seconds."""
+    """Images of the camera of a configuration, for at most so many seconds.
+
+    While none arrive it is printed why; after `camera.source.lost_timeout` it is a `CameraError`.
+    """
     from tautscope.calibration.images import to_bgr  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
 
     def read() -> Generator[Image]:
         with Camera(config.camera) as camera:
             print("Show the board, and hold it still in each pose.", file=sys.stderr, flush=True)
-            end = time.monotonic() + seconds
+            end, trouble = time.monotonic() + seconds, ""
             while time.monotonic() < end:
-                capture = camera.newest()
-                if capture is None:
-                    time.sleep(0.002)
-                else:
+                if (capture := camera.newest()) is not None:
+                    trouble = ""
                     yield to_bgr(capture.frame.image, config.camera.pixel_format)
+                    continue
+                state, lost = camera.state, config.camera.source.lost_timeout
+                if state.age > lost:
+                    allowed = f"images; none came for camera.source.lost_timeout, {lost:g} s"
+                    raise CameraError("camera.source", state.trouble, allowed)
+                if state.trouble and not trouble:
+                    trouble = state.trouble
+                    print(f"camera: {trouble}", file=sys.stderr, flush=True)
+                time.sleep(0.002)
 
     size = config.camera.width, config.camera.height
     return BoardImages(size, read(), True, True, camera_serial_number(config.camera))

@@ -28,7 +28,7 @@ SHARE = 0.8
 """Amplitude and period of the motion over those of the experiment: the speed is the same."""
 PERIODS = 3
 DISAGREEMENT = 3.0
-"""Largest difference from the delay of the geometry over its standard deviation."""
+"""Largest difference from the delay of the last calibration over its standard deviation."""
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -94,8 +94,8 @@ def result(
 ) -> CalibrationResult:
     """The delay in the form that all calibrations have.
 
-    The calibration of the geometry has estimated it too. The value with the smaller standard
-    deviation is kept; if both disagree, there is no answer.
+    The configured delay may be that of a calibration, of the geometry or of the latency. The value
+    with the smaller standard deviation is kept; if both disagree, there is no answer.
 
     Raises:
         CalibrationError: There is no answer, or the images are stamped before they are captured.
@@ -103,24 +103,26 @@ def result(
     if not found.is_known:
         remedy = "Give camera.source.delay yourself, or leave out this step: docs/recordings.md"
         raise CalibrationError(f"The delay is unknown: {found.reason}", remedy)
-    delay = config.camera.source.delay + found.delay
-    if delay < 0:
+    key, before = "camera.source.delay", config.camera.source.delay
+    delay, std = before + found.delay, found.delay_std
+    if delay < -2 * std:
         what = f"The images are stamped {-1e3 * delay:.0f} ms before they are captured"
         raise CalibrationError(what, "Check camera.source.clock")
-    key, before = "camera.source.delay", config.camera.source.delay
-    std = found.delay_std
     shown = f"delay {1e3 * delay:.1f} ms, standard deviation {1e3 * std:.1f} ms"
+    delay = max(delay, 0.0)
     notes = (f"{shown}; it was {1e3 * before:.1f} ms",)
-    geometry = config.calibration.geometry
-    other = None if geometry is None else geometry.std.get(key)
-    if other is not None:
-        by_geometry = f"{1e3 * before:.1f} ms, standard deviation {1e3 * other:.1f} ms"
+    kinds = ((name, getattr(config.calibration, name)) for name in ("geometry", "latency"))
+    records = [(each.at, name, each.std[key]) for name, each in kinds if each and key in each.std]
+    if records:
+        _, name, other = max(records)
+        known = f"{1e3 * before:.1f} ms, standard deviation {1e3 * other:.1f} ms"
         if abs(found.delay) > DISAGREEMENT * math.hypot(std, other):
-            what = f"The motion gives a {shown}, the calibration of the geometry {by_geometry}"
-            raise CalibrationError(what, "Repeat both, with the instrument free and in view")
+            what = f"The motion gives a {shown}, the calibration of the {name} {known}"
+            remedy = "Repeat that of the geometry, then this, with the instrument free and in view"
+            raise CalibrationError(what, remedy)
         if other < std:
             delay, std = before, other
-            notes = (f"{shown}; kept: that of the geometry, {by_geometry}",)
+            notes = (f"{shown}; kept: that of the {name}, {known}",)
     return CalibrationResult(
         "latency",
         {key: delay},

@@ -162,12 +162,16 @@ def read_motion(
     make: Callable[[Config], Recorder],
     allowed: str = "a log (.mcap), or a video with --motors",
 ) -> tuple[Recorder, Config]:
-    """Read a log, or a video with ``--motors``, into a recorder; `allowed` is for the error."""
+    """Read a log, or a video with ``--motors``, into a recorder; `allowed` is for the error.
+
+    The configuration that is returned has the delay that the stamps are without.
+    """
     if file.suffix == ".mcap":
         return _read_log(options, file, make)
     if options.motors is None:
         raise FieldError("file", str(file), allowed)
     config = arguments.article_config(options.config)
+    config = config.replace(**{"camera.source.delay": 0.0})  # a video is stamped without it
     recorder = make(config)
     times, positions = read_positions(str(options.motors), options.units, config)
     for time, position in zip(times, positions, strict=True):
@@ -185,7 +189,9 @@ def _read_log(
 
     log = read_log(file)
     config = log.config if options.config is None else arguments.article_config(options.config)
-    config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
+    camera = log.config.camera  # of which its images and stamps are
+    changes = {"pixel_format": camera.pixel_format, "source.delay": camera.source.delay}
+    config = config.replace(**{f"camera.{key}": value for key, value in changes.items()})
     recorder = make(config)
     for index, event in log.events.items():
         if isinstance(event, Tick):

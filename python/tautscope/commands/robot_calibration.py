@@ -107,11 +107,19 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         section, key = name.split(".")
         before = getattr(getattr(config, section), key, None)
         notes.append(f"{name} was {'not set' if before in (None, ()) else before}")
+    oldest = config.safety.frame_age
     for name, each in std.items():
-        if name.startswith("measurement.delays") and found.values[name] < -2 * each:
+        if not name.startswith("measurement.delays"):
+            continue
+        if (delay := found.values[name]) < -2 * each:
             notes.append(
-                f"Measurements are stamped {-1e3 * found.values[name]:.0f} ms before the motors' "
-                f"clock: {name} is set to 0, which cannot express it. Check the clock of the sensor"
+                f"Measurements are stamped {-1e3 * delay:.0f} ms before the motors' clock: {name} "
+                "is set to 0, which cannot express it. Check the clock of the sensor"
+            )
+        if delay > oldest and "late" not in config.safety.off:
+            notes.append(
+                f"{name} is above safety.frame_age = {oldest:g} s, from which on measurements are "
+                f"too old: set safety.frame_age to more than {delay:.2f} s before --write"
             )
     is_written = "actuators.matrix" in values
     written = "in actuators.matrix and offsets" if is_written else "not written"

@@ -15,6 +15,7 @@ from tautscope.config import CameraConfig
 from tautscope.errors import CameraError, CameraMismatchError, NoRigError
 from tautscope.hardware.stream_clock import JUMP, StreamClock
 from tautscope.hardware.video import DecodedFrame, Decoder, open_source
+from tautscope.loop.frame_layout import brightness
 from tautscope.loop.rig import Frame
 
 TEST_FRAMES = 8
@@ -215,10 +216,7 @@ def check_first_frames(captures: Sequence[Capture], config: CameraConfig) -> Non
             f"{len(captures)} frames in {source.start_timeout:g} s",
             f"at least {TEST_FRAMES}; is the camera on, connected, and used by no other program?",
         )
-    images = [capture.frame.image for capture in captures]
-    # The bytes of an image that contain brightness.
-    channel = {"yuyv": 0, "uyvy": 1}.get(config.pixel_format, slice(3))
-    bright = (im[..., channel] if im.ndim == 3 else im[: config.height] for im in images)
+    bright = (brightness(each.frame.image, config.pixel_format) for each in captures)
     brightest = max(int(part.max()) for part in bright)
     if brightest <= source.darkest:
         raise CameraError(

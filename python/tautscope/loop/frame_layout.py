@@ -15,7 +15,7 @@ needs no conversion. Y, U, V are ITU-R BT.601 with limited range.
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import CameraConfig
+from tautscope.config import CameraConfig, PixelFormat
 from tautscope.errors import FrameError
 
 _CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}  # the others are planar
@@ -52,6 +52,27 @@ class FrameLayout:
                 f"{wanted}, contiguous in each line and top to bottom; np.ascontiguousarray copies",
             )
         return image
+
+
+def brightness(image: NDArray[np.uint8], pixel_format: PixelFormat) -> NDArray[np.uint8]:
+    """The bytes of an image that contain brightness, (h, w, 3) B, G, R or (h, w, 1) Y; a view."""
+    if image.ndim == 2:
+        return image[: len(image) * 2 // 3, :, None]
+    return image[..., {"yuyv": slice(1), "uyvy": slice(1, 2)}.get(pixel_format, slice(3))]
+
+
+def black(camera: CameraConfig) -> NDArray[np.uint8]:
+    """A black image."""
+    image = np.zeros(FrameLayout(camera).shape, np.uint8)
+    if white(camera.pixel_format) < 255:
+        image[:] = 128
+        brightness(image, camera.pixel_format)[:] = 16
+    return image
+
+
+def white(pixel_format: PixelFormat) -> int:
+    """The brightness of white."""
+    return 255 if pixel_format in ("bgr", "rgb", "bgra") else 235
 
 
 def _described(image: object) -> str:

@@ -36,7 +36,8 @@ class Frame:
     """One camera image.
 
     Attributes:
-        image: Pixels, uint8 (height, width, 3), BGR.
+        image: Pixels, uint8, in `camera.pixel_format`: (height, width, 3) B, G, R by default;
+            `tautscope.loop.frame_layout` lists the shapes.
         captured_at: When it was taken [s, the rig's clock], not when it arrived.
         sequence: Counts the camera's frames; a gap is a dropped frame.
         true_features: (4,) [px] what an ideal segmentation would measure if each band were wholly
@@ -53,6 +54,8 @@ class Frame:
 
     def __repr__(self) -> str:
         height, width = self.image.shape[:2]
+        if self.image.ndim == 2:  # nv12 and i420 have U and V below the rows of Y
+            height = height * 2 // 3
         return f"<Frame {self.sequence}: {width} x {height}, captured at {self.captured_at:.3f} s>"
 
 

@@ -143,7 +143,7 @@ class MarkerDetector:
       0048).
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
-    value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.07 grey levels by
+    value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.082 grey levels by
     default.
 
     One detector may be shared between threads; calls take turns. No result depends on earlier

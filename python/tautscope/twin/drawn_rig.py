@@ -22,6 +22,8 @@ BAND = 1e-3
 """Of the position of a band [m]."""
 DELAY = 0.2
 """Largest delay from the capture of an image to its stamp [s]."""
+INTRINSICS = tuple(f"camera.{key}" for key in ("fx", "fy", "cx", "cy", "distortion"))
+"""Written by a calibration of the camera; the last without deviations if the lens is a fisheye."""
 _DOMAIN = 18
 
 
@@ -63,9 +65,10 @@ def draw_values(config: Config, seed: int) -> dict[str, Any]:
         "twin.sensor.stamp_error": random.uniform(0, DELAY),
         "twin.seed": seed,
     }
-    for record in (config.calibration.camera, config.calibration.geometry):
+    records = (config.calibration.camera, INTRINSICS), (config.calibration.geometry, ())
+    for record, written in records:
         if record is not None and record.serial_numbers.get(TWIN) == str(seed):
-            for key in record.std:
+            for key in (*record.std, *written):
                 drawn.pop(key.partition("[")[0], None)
     return drawn
 

@@ -21,6 +21,8 @@ pub enum Rejection {
     NoInstrument,
     /// A band found alone may be either of the two.
     Ambiguous,
+    /// A band was found alone, and where the instrument is, is not known.
+    Alone,
     /// The bands are too far from their predicted positions: this Mahalanobis distance.
     Elsewhere(f64),
 }
@@ -42,6 +44,7 @@ impl fmt::Display for Rejection {
             }
             Self::NoInstrument => f.write_str("no instrument between the bands"),
             Self::Ambiguous => f.write_str("what could be it could be the other one"),
+            Self::Alone => f.write_str("alone, and where the instrument is, is not known"),
             Self::Elsewhere(distance) => {
                 write!(f, "{distance:.1} deviations from where it is expected")
             }

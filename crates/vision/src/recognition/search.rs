@@ -116,7 +116,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         self.refine(&self.fit(observed, std, [true; 2], COARSE)?)
     }
 
-    /// Rejects a band found alone if it is not complete enough, or if the same pixels fit the other band as well.
+    /// Rejects a band found alone if the posture is not known, it is not complete enough, or the same pixels fit the other as well.
     fn check_single(&self, mut found: Recognition, band: usize, regions: &[Region]) -> Recognition {
         let (score, other) = (found.scores[band], 1 - band);
         let least = self.settings.least_edges_alone;
@@ -134,7 +134,9 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
                         < score.mahalanobis_squared + AMBIGUITY
             })
         };
-        if score.edges < least || score.coverage < 0.75 * least {
+        if self.settings.is_unlocated {
+            found.rejections[band] = Some(Rejection::Alone);
+        } else if score.edges < least || score.coverage < 0.75 * least {
             found.rejections[band] = Some(Rejection::MissingEdges(score.edges));
         } else if fits_other([u, v]) || nearest.is_some_and(fits_other) {
             found.rejections[band] = Some(Rejection::Ambiguous);

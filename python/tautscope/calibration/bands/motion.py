@@ -14,14 +14,21 @@ from tautscope.calibration.bands import labels
 from tautscope.calibration.bands.labels import LEAST_AREA, LabelledImage, Mask
 from tautscope.calibration.colour import fit_discriminant
 from tautscope.calibration.images import Image, to_bgr
-from tautscope.calibration.motion import ImageRecorder, Progress, Sines, article_sines
+from tautscope.calibration.motion import (
+    ImageRecorder,
+    Progress,
+    Sines,
+    article_sines,
+    feasible_periods,
+)
 from tautscope.config import Config
 from tautscope.errors import CalibrationError, FieldError
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
+from tautscope.loop.signal_checks import as_numbers
 
 DURATION = 10.0
-"""Duration of the motion [s]."""
+"""Duration of the motion, unless the motors are slow [s]."""
 MOST_IMAGES = 60
 _SHARE = (1.0, 0.0, 0.6)
 """Amplitude relative to that of the experiment."""
@@ -88,8 +95,10 @@ class ImageSequence(ImageRecorder):
 def record_motion(rig: Rig, config: Config, progress: Progress | None = None) -> ImageSequence:
     """Move insertion and bending, as `move_rig`, within the experiment's range; keep images."""
     centre, amplitude = article_sines(config)
+    amplitude, turns = amplitude * _SHARE, np.array(_TURNS)
+    periods = feasible_periods(config, amplitude, DURATION / turns)
     found = ImageSequence(config)
-    motion = Sines(centre, amplitude * _SHARE, DURATION / np.array(_TURNS), DURATION)
+    motion = Sines(centre, amplitude, periods, float((periods * turns).max()))
     found.move(rig, config, motion, progress)
     return found
 
@@ -138,7 +147,8 @@ def find_moving_bands(
         FieldError: Numbers of images, times and positions differ, or are too few.
         CalibrationError: Nothing moved, or no two bands were found.
     """
-    stamps, motors = np.asarray(times, np.float64), np.asarray(positions, np.float64)
+    stamps = as_numbers("times", times, "numbers, one per image")
+    motors = as_numbers("positions", positions, "numbers, one row per image")
     if len(images) < LEAST_IMAGES:
         raise FieldError("images", len(images), f"at least {LEAST_IMAGES}")
     for name, array, shape in (

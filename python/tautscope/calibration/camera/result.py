@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tautscope.calibration.camera.coverage import COLUMNS, ROWS, Coverage
-from tautscope.calibration.camera.intrinsics import CameraFit, Intrinsics
+from tautscope.calibration.camera.intrinsics import LARGEST_RESIDUAL, CameraFit, Intrinsics
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
 from tautscope.figure_style import BLUE
@@ -80,7 +80,8 @@ def to_loop_model(camera: Intrinsics) -> tuple[Intrinsics, float]:
         The camera, and the largest distance between the two models within those angles [px].
 
     Raises:
-        CalibrationError: The lens maps angles to radii that do not increase, as none does.
+        CalibrationError: The lens maps angles to radii that do not increase, as none does, or the
+            error is above `LARGEST_RESIDUAL`.
     """
     if camera.model == "pinhole":
         padded = (*camera.distortion, *(0.0,) * (8 - len(camera.distortion)))
@@ -98,8 +99,14 @@ def to_loop_model(camera: Intrinsics) -> tuple[Intrinsics, float]:
     converted = Intrinsics(camera.size, "pinhole", camera.focal, camera.centre, distortion)
     x = np.column_stack([radii, np.zeros_like(radii), np.ones_like(radii)])
     rays = np.vstack([x, x[:, [1, 0, 2]]])
-    difference = camera.project(rays) - converted.project(rays)
-    return converted, float(np.abs(difference).max())
+    error = float(np.abs(camera.project(rays) - converted.project(rays)).max())
+    if not error <= LARGEST_RESIDUAL:
+        raise CalibrationError(
+            f"the fitted fisheye lens and the nearest pinhole of the loop differ by {error:.2g} px",
+            f"At most {LARGEST_RESIDUAL:g} px: show the board close to the corners of the image, "
+            "or try --model pinhole",
+        )
+    return converted, error
 
 
 def _bent_angle(camera: Intrinsics, angles: Floats) -> Floats:

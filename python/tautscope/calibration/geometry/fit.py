@@ -13,10 +13,16 @@ from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
-from tautscope.calibration.geometry.values import Value, changes_and_stds, estimated_values
+from tautscope.calibration.geometry.values import (
+    DELAY,
+    Value,
+    changes_and_stds,
+    estimated_values,
+)
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.kinematics import Floats
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector
 
@@ -82,7 +88,8 @@ def fit(
 
     Args:
         recording: From `sweep`, or of your own motors and features.
-        config: The configuration with a rough geometry, within about 5 mm and 5 deg.
+        config: The configuration with a rough geometry, within about 5 mm and 5 deg; its
+            `camera.source.delay` has been subtracted from the stamps.
         intrinsics: ``none``, ``focal`` (one factor of both focal lengths) or ``all``.
         band_distance: Measured distance of the bands' centres [m], in place of the drive's scale.
 
@@ -91,10 +98,11 @@ def fit(
             too little motion.
         FieldError: An option has a value that is not allowed.
     """
-    if band_distance is not None and not (
-        np.isfinite(band_distance) and band_distance > config.instrument.band_length
-    ):
-        raise FieldError("band_distance", band_distance, "a length above instrument.band_length")
+    if band_distance is not None:
+        allowed = "a length above instrument.band_length"
+        distance = as_numbers("band_distance", band_distance, allowed)
+        if distance.shape or not config.instrument.band_length < distance < np.inf:
+            raise FieldError("band_distance", band_distance, allowed)
     active = estimated(intrinsics, by_band_distance=band_distance is not None)
     check_record(recording, config)
     model = Model(config, recording.with_bands(), band_distance)
@@ -137,7 +145,7 @@ def _result(
         warnings.append(short)
     values = estimated_values(model, solution, active)
     changes, stds = changes_and_stds(model.config, model.configured(solution.z), values)
-    delay = next(value for value in values if value.name == "camera.source.delay")
+    delay = next(value for value in values if value.name == DELAY)
     if delay.after < -2 * delay.std:
         warnings.append(
             f"Images are stamped {-delay.after * 1e3:.0f} ms before the motors' clock: "

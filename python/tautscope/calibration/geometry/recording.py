@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections import Counter
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +16,13 @@ from numpy.typing import NDArray
 from tautscope.calibration.bands.labels import centroid, two_bands
 from tautscope.calibration.images import Image, to_bgr
 from tautscope.calibration.motion import DURATION, ImageRecorder, Progress, sweep_motion
-from tautscope.config import CameraConfig, Config
+from tautscope.config import CameraConfig, Config, PixelFormat
 from tautscope.errors import SignalError
 from tautscope.loop.construction import build_feature_model
-from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.frame_layout import black, brightness, white
 from tautscope.loop.kinematics import Floats
 from tautscope.loop.rig import Rig
+from tautscope.loop.signal_checks import as_numbers
 from tautscope.loop.vision import Detection, MarkerDetector
 
 IMAGE_PERIOD = 0.08
@@ -28,6 +32,9 @@ LEAST_FOUND = 0.25
 used."""
 MARGIN = 60
 """Pixels that are kept around the regions of the markers' colour [px]: tissue beside the bands."""
+LARGEST_SPAN = 0.5
+"""Largest distance between such regions, as a share of the image's sides: other things have that
+colour, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,23 +42,51 @@ class Patch:
     """The part of an image in which the bands are.
 
     Attributes:
-        left, top: Column and row of its first pixel in the image [px].
-        pixels: The pixels; the whole image in a format without one element per pixel.
+        left, top: Column and row of its first pixel in the image [px], even.
+        pixels: The pixels, an image of the same format; of no size if none were kept.
     """
 
     left: int
     top: int
     pixels: Image
 
+    @classmethod
+    def cut(cls, image: Image, pixel_format: PixelFormat, box: Sequence[int]) -> Patch:
+        """The part of an image in a box: left, top, and the column and row after the last [px].
+
+        It is wider where pixels share U and V.
+        """
+        left, top, right, bottom = (edge // 2 * 2 for edge in np.add(box, (0, 0, 1, 1)))
+        parts = [
+            plane[top // each : bottom // each, left // each : right // each]
+            for plane, each in _planes(image, pixel_format)
+        ]
+        if len(parts) == 1:
+            return cls(left, top, parts[0].copy())
+        together = np.concatenate([part.ravel() for part in parts])
+        return cls(left, top, together.reshape(len(parts[0]) * 3 // 2, right - left))
+
     def image(self, camera: CameraConfig) -> Image:
         """The image with black in place of the pixels that were not kept."""
-        shape = FrameLayout(camera).shape
-        if self.pixels.shape == shape:
-            return self.pixels
-        whole = np.zeros(shape, np.uint8)
-        height, width = self.pixels.shape[:2]
-        whole[self.top : self.top + height, self.left : self.left + width] = self.pixels
+        whole = black(camera)
+        if self.pixels.size:
+            planes = (_planes(image, camera.pixel_format) for image in (whole, self.pixels))
+            for (plane, each), (part, _) in zip(*planes, strict=True):
+                left, top, (height, width) = self.left // each, self.top // each, part.shape[:2]
+                plane[top : top + height, left : left + width] = part
         return whole
+
+
+def _planes(image: Image, pixel_format: PixelFormat) -> list[tuple[Image, int]]:
+    """The planes of an image as views, and the pixels per element along each side."""
+    if image.ndim == 3:
+        return [(image, 1)]
+    height, width = len(image) * 2 // 3, image.shape[1]
+    colour = image[height:].reshape(-1)
+    if pixel_format == "nv12":
+        return [(image[:height], 1), (colour.reshape(height // 2, width // 2, 2), 2)]
+    u, v = colour.reshape(2, height // 2, width // 2)
+    return [(image[:height], 1), (u, 2), (v, 2)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +100,8 @@ class Recording:
         features: (images, 4) u and v of bands A and B [px]; NaN where a band was not found.
         patches: The images, for a second detection with the fitted geometry; empty without images.
         reasons: Why bands were not found: text -> number of images.
-        saturated: Median share of saturated pixels (a channel at 255) around the bands, or of the
-            whole image in a format without one element per pixel.
+        saturated: Median share of saturated pixels (B, G or R at 255, Y at 235) around the bands,
+            or of the whole image where no pixels were kept.
     """
 
     time: Floats
@@ -78,19 +113,21 @@ class Recording:
     saturated: float = 0.0
 
     def __post_init__(self) -> None:
-        ticks, images = len(self.time), len(self.captured_at)
+        ticks, images = np.size(self.time), np.size(self.captured_at)
         for name, shape in (
             ("time", (ticks,)),
             ("motors", (ticks, 3)),
             ("captured_at", (images,)),
             ("features", (images, 4)),
         ):
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise SignalError(name, f"an array {found}", f"shape {shape}")
+            values = as_numbers(name, getattr(self, name), f"numbers, shape {shape}")
+            if values.shape != shape:
+                raise SignalError(name, f"an array {values.shape}", f"shape {shape}")
         for name in ("time", "motors", "captured_at"):
             if not np.isfinite(getattr(self, name)).all():
                 raise SignalError(name, "a number that is not finite", "finite numbers")
+        if not ticks:
+            raise SignalError("time", "no time", "that of each position of the motors")
         if (np.diff(self.captured_at) < 0).any():
             raise SignalError("captured_at", "a time before the last", "times in order")
         if (np.diff(self.time) <= 0).any():
@@ -137,17 +174,18 @@ class Recorder(ImageRecorder):
         if not detection.valid:
             self._reasons[generic(detection.reason)] += 1
         features = detection.features if detection.valid else np.full(4, np.nan)
-        patch = self._patch(image, detection)
-        pixels = patch.pixels
-        if pixels.ndim == 2:  # planes: brightness, and below it colour
-            pixels = pixels[: self._camera.height, :, None]
-        saturated = float(np.mean(pixels.max(axis=-1) == 255)) if pixels.size else 0.0
-        self._images.append((captured_at, features, self._by_regions(image), patch, saturated))
+        by_regions = self._by_regions(image, captured_at)
+        bands = next((each for each in (features, by_regions) if np.isfinite(each).all()), None)
+        patch, pixel_format = self._patch(image, detection, bands), self._camera.pixel_format
+        bright = brightness(patch.pixels if patch.pixels.size else image, pixel_format)
+        saturated = float((bright >= white(pixel_format)).any(axis=2).mean())
+        self._images.append((captured_at, features, by_regions, patch, saturated))
         return detection
 
-    def _by_regions(self, image: Image) -> Floats:
+    def _by_regions(self, image: Image, captured_at: float) -> Floats:
         """The centroids of two regions of the bands' colour, ordered as the motors let expect."""
-        predicted = self._model.predict(self.ticks[-1][1]) if self.ticks else None
+        index = max(bisect_right(self.ticks, captured_at, key=itemgetter(0)) - 1, 0)
+        predicted = self._model.predict(self.ticks[index][1]) if self.ticks else None
         pixels = to_bgr(image, self._camera.pixel_format)
         bands = two_bands(pixels, self._vision.weights, self._vision.threshold)
         if predicted is None or bands is None:
@@ -170,14 +208,21 @@ class Recorder(ImageRecorder):
         reasons, share = dict(self._reasons.most_common()), float(np.median(saturated))
         return Recording(time, positions, stamps, points, patches, reasons, share)
 
-    def _patch(self, image: Image, detection: Detection) -> Patch:
-        camera = self._camera
-        if image.shape[:2] != (camera.height, camera.width) or not detection.regions:
-            return Patch(0, 0, image.copy())
-        boxes = np.array([region.box for region in detection.regions])
-        left, top = np.maximum(boxes[:, :2].min(axis=0) - MARGIN, 0)
-        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0) + MARGIN
-        return Patch(int(left), int(top), image[top:bottom, left:right].copy())
+    def _patch(self, image: Image, detection: Detection, bands: Floats | None) -> Patch:
+        """The pixels around the regions near the bands, or around two near the largest one."""
+        size, box = np.array([self._camera.width, self._camera.height]), [0, 0, 0, 0]
+        if regions := detection.regions:
+            known = [regions[0].centroid] if bands is None else bands.reshape(2, 2)
+            middle = np.mean(known, axis=0)
+            reach = LARGEST_SPAN / 2 * size
+            near = [each for each in regions if (np.abs(each.centroid - middle) <= reach).all()]
+            if len(near) > (bands is None):
+                boxes = np.array([region.box for region in near])
+                first, last = boxes[:, :2].min(axis=0), (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
+                low = np.maximum(first, middle - reach) - MARGIN
+                high = np.minimum(last, middle + reach) + MARGIN
+                box = [*np.maximum(low, 0).astype(int), *np.minimum(high, size).astype(int)]
+        return Patch.cut(image, self._camera.pixel_format, box)
 
 
 def generic(reason: str) -> str:

@@ -12,6 +12,7 @@ from tautscope.calibration.geometry.parameters import PARAMETERS, POSE
 from tautscope.calibration.geometry.solver import Solution
 from tautscope.config import Config
 
+DELAY = "camera.source.delay"
 _LENGTHS = ("bending_length", "marker_a", "marker_b")
 
 
@@ -42,6 +43,7 @@ def estimated_values(
     """The estimated parameters; without a key of their own they are differences from 0."""
     config = model.config
     start, end = _values(config, config), _values(model.configured(solution.z), config)
+    start[DELAY] = config.camera.source.delay  # already subtracted from the stamps
     difference = solution.z * model.prior_std
     std = np.sqrt(np.diag(solution.covariance))
     found = []
@@ -79,11 +81,10 @@ def changes_and_stds(
     known = {value.name: value for value in values}
     std = {value.name: value.std for value in values}
     camera, instrument, pose = fitted.camera, fitted.instrument, fitted.camera.camera_from_guide
-    delay = "camera.source.delay"
     changes: dict[str, Any] = {
         f"{POSE}.translation": list(pose.translation),
         f"{POSE}.rotation": list(pose.rotation),
-        delay: max(known[delay].after, 0.0),
+        DELAY: max(known[DELAY].after, 0.0),
     }
     changes |= {f"instrument.{key}": getattr(instrument, key) for key in _LENGTHS}
     # With a measured distance both bands move together.
