@@ -36,13 +36,15 @@ MODEL = """
   </actuator>
 </mujoco>
 """
-CONFIG = axes(2, names=["shoulder", "elbow"], width_limit=0.8, range=(-1.5, 1.5))
+CONFIG = axes(2, names=["shoulder", "elbow"], width_limit=0.8, range=(-1.5, 1.5)).replace(
+    **{"control.period": 0.01}
+)
 
 
 class Arm:
     """Your model, and what measures its joints or its tip."""
 
-    control_period = 0.01
+    control_period = CONFIG.control.period
 
     def reset(self) -> Sample:
         """At rest in the middle."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ from xml.etree import ElementTree
 
 from tautscope import Config, TautscopeError, __version__, load_config
 from tautscope.config import dump_config
+from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 try:
@@ -120,14 +122,24 @@ def variables_of(kind: str, config: Config) -> list[Variable]:
         names = [dof.name for dof in config.dof]
         raise ConfigError("dof", names, "none: the twin is the article's instrument")
     absent = ("has_image", "features_") if config.dof else ("has_measured", "measured_")
+    # An input that is not connected moves nothing: the twin starts here.
+    rest = {} if config.dof else {dof.label: config.experiment[dof].centre for dof in Dof}
     variables: list[Variable] = []
     for each in UNITS[kind]:
         group, star, _ = each.name.partition("_*")
         for dof in config.dofs if star else ():
             unit = "m" if dof.display_unit == "mm" else "rad"
-            variables.append(each._replace(name=f"{group}_{dof.label}", unit=unit, group=group))
+            start = rest.get(dof.label, 0.0) if each.role == "input" else each.start
+            name = f"{group}_{dof.label}"
+            variables.append(each._replace(name=name, unit=unit, start=start, group=group))
         variables += [] if star else [each]
-    return [each for each in variables if not each.name.startswith(absent)]
+    variables = [each for each in variables if not each.name.startswith(absent)]
+    names = [variable.name for variable in variables]
+    for index, dof in enumerate(config.dof):
+        if any(names.count(name) > 1 for name in names if name.endswith(f"_{dof.name}")):
+            allowed = "a name that does not make two variables equal, as reference_age"
+            raise ConfigError(f"dof[{index}].name", dof.name, allowed)
+    return variables
 
 
 def token(kind: str, config: Config) -> str:
@@ -211,7 +223,10 @@ def compile_unit(kind: str, config: Config, folder: Path) -> Path:
     (folder / "variables.h").write_text(header(kind, config), encoding="utf-8")
     library = folder / (f"tautscope_{kind}" + (".dylib" if sys.platform == "darwin" else ".so"))
     includes = [folder, HERE, Path(fmpy.__file__).parent / "c-code", ROOT / "crates/ffi/include"]
-    command = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC"]
+    compiler = os.environ.get("CC", "cc")
+    if shutil.which(compiler) is None:
+        raise ConfigError("CC", compiler, "a C compiler")
+    command = [compiler, "-std=c99", "-O2", "-shared", "-fPIC"]
     command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
     command += [f"-I{include}" for include in includes]
     command += [str(HERE / name) for name in ("unit.c", "unsupported.c", f"{kind}.c")]
@@ -256,10 +271,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the .fmu to write")
     parser.add_argument("--config", metavar="FILE", help="TOML file; missing keys are the defaults")
     options = parser.parse_args()
+    if options.out.is_dir() or not options.out.absolute().parent.is_dir():
+        parser.error(f"--out: got {options.out}, expected a file in a folder that exists")
     try:
         build(options.kind, options.out, load_config(options.config))
     except TautscopeError as error:
         parser.error(str(error))
+    except subprocess.CalledProcessError as error:
+        parser.error(f"CC: {error.cmd[0]} ended with status {error.returncode}: see its messages")
+    except OSError as error:
+        parser.error(f"--out: {error}")
     print(options.out)
 
 

@@ -54,6 +54,38 @@ def test_a_robot_without_a_unit_is_refused_by_name(opened: Callable[..., Unit]) 
         opened("loop", robot.replace(**{"kinematics.kind": "two_planes"}))
 
 
+def test_a_name_that_makes_two_variables_equal_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"dof\[1\]\.name: got 'age'"):
+        build.variables_of("loop", axes(2, width_limit=1.2, names=["bend", "age"]))
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        ("missing/twin.fmu", "cc", "--out: got missing/twin.fmu, expected a file in a folder"),
+        (".", "cc", "--out: got ., expected a file in a folder that exists"),
+        ("twin.fmu", "no-such-cc", "CC: got 'no-such-cc', expected a C compiler"),
+        ("twin.fmu", "false", "CC: false ended with status 1"),
+        ("/dev/full", "cc", "--out: [Errno 28]"),
+    ],
+)
+def test_a_unit_that_cannot_be_built_is_one_line(
+    case: tuple[str, str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out, compiler, words = case
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CC", compiler)
+    monkeypatch.setattr(sys, "argv", ["build.py", "twin", "--out", out])
+    with pytest.raises(SystemExit) as ended:
+        build.main()
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_interpreter_that_does_not_exist_is_named(opened: Callable[..., Unit]) -> None:
     with pytest.raises(RuntimeError, match="/no/such/python cannot be started: No such file"):
         opened("twin", python="/no/such/python")

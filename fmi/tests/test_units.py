@@ -177,6 +177,16 @@ def test_before_a_measurement_the_slack_is_the_expected_one(
             unit.step(0.0)
 
 
+def test_inputs_that_are_not_set_move_nothing(opened: Callable[..., Unit]) -> None:
+    twin, loop = opened("twin", has_camera=False), opened("loop")
+    start = twin.get_all("applied")
+    for k in range(200):
+        loop.step(k * PERIOD)
+        twin.step(k * PERIOD)
+    np.testing.assert_array_equal(twin.get_all("applied"), start)
+    np.testing.assert_allclose(loop.get_all("command"), start, atol=1e-3)
+
+
 def test_the_two_units_together_are_the_loop_on_the_twin(opened: Callable[..., Unit]) -> None:
     """Images of the one unit go to the other, commands back; 10 s."""
     plant, loop = opened("twin", seed=3), opened("loop")

@@ -11,7 +11,7 @@ classdef Loop < handle
     % Its key `profile` selects the profile. Times are s on one clock of yours. Pixels count from 0 at the centre of the first one:
     % subtract 1 from positions that MATLAB gives.
     %
-    % Errors have the identifiers tautscope:Config, tautscope:Signal and tautscope:Image, and leave the loop unchanged.
+    % Errors have the identifiers tautscope:Config, tautscope:Signal, tautscope:Size and tautscope:Image, and leave the loop unchanged.
 
     properties (SetAccess = private)
         period  % Control period of the configuration [s].
@@ -25,6 +25,7 @@ classdef Loop < handle
 
     methods
         function self = Loop(configuration)
+            configuration = char(configuration);  % or a string of MATLAB
             if any(configuration == sprintf('\n'))
                 self.toml = unicode2native(configuration, 'UTF-8');
             else

@@ -102,6 +102,9 @@ class Laboratory(Node):
             lambda message: self.drive_commands.append(message.string),
             reliable,
         )
+        self.position: list[float] = []
+        self._listen(JointState, commands, self._move, reliable)
+        self.create_timer(0.01, self._measure)
         self.executor_of_tests = SingleThreadedExecutor()
         self.executor_of_tests.add_node(self)
 
@@ -127,12 +130,20 @@ class Laboratory(Node):
         self.requests.publish(StringStamped(string=text))
 
     def measure(self, position: NDArray[np.float64]) -> None:
-        """Publish where the drives are (3,), once the node listens."""
+        """Publish from now on where the drives are: here (3,), then where they are commanded."""
         self.wait_for(lambda: self.drives.get_subscription_count() > 0)
-        message = JointState(name=JOINTS, position=list(position))
-        message.header.stamp = self.get_clock().now().to_msg()
-        self.drives.publish(message)
+        self.position = list(position)
         self.spin(0.2)
+
+    def _move(self, command: JointState) -> None:
+        if self.position:
+            self.position = list(command.position)
+
+    def _measure(self) -> None:
+        if self.position:
+            message = JointState(name=JOINTS, position=self.position)
+            message.header.stamp = self.get_clock().now().to_msg()
+            self.drives.publish(message)
 
     def refer(self, position: NDArray[np.float64]) -> int:
         """Publish a reference (3,); its stamp [ns]."""

@@ -99,7 +99,6 @@ def test_a_session(laboratory, recorded):
     sent = len(laboratory.commands)
     laboratory.spin(0.2)
     assert len(laboratory.commands) == sent
-    laboratory.measure(laboratory.commands[-1].position)
     laboratory.request("enable")
     laboratory.wait_for(lambda: laboratory.states[-1] == "ENABLED")
 
@@ -131,6 +130,15 @@ def test_enable_is_refused_while_it_is_not_known_where_the_drives_are(laboratory
     laboratory.request("enable")
     laboratory.wait_for(lambda: any("enable is refused" in text for text in laboratory.warnings))
     assert laboratory.states[-1] == "DISABLED"
+
+
+def test_silent_drives_are_a_fault(laboratory, recorded):
+    laboratory.measure(recorded.ticks[0][2:5])
+    laboratory.request("enable")
+    laboratory.wait_for(lambda: laboratory.states[-1] == "ENABLED")
+    laboratory.position.clear()
+    laboratory.spin(0.5)
+    assert laboratory.states[-1] == "FAULT"
 
 
 def test_motion_begins_where_the_drives_are(laboratory, recorded):

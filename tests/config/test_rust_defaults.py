@@ -23,9 +23,9 @@ def defaults() -> str:
     return dump_config(axes(1, width_limit=1.0))
 
 
-def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, Any]]:
-    """Key, least and largest value of the numbers whose type has an upper limit; of a list of
-    numbers, those of each that it may have."""
+def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, Any, tuple[bool, bool]]]:
+    """Key, least and largest value of the numbers whose type has an upper limit, and which of the
+    two are excluded; of a list of numbers, those of each that it may have."""
     match kind:
         case types.StructType(fields=fields):
             for field in fields:
@@ -34,7 +34,7 @@ def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, Any]]:
             low, high = kind.ge if kind.gt is None else kind.gt, kind.le or kind.lt
             if high is not None:
                 assert low is not None, path
-                yield path, [float(low), float(high)]
+                yield path, [float(low), float(high)], (kind.ge is None, kind.le is None)
         case types.UnionType(types=members):
             for member in members:
                 yield from bounds(path, member)
@@ -45,11 +45,12 @@ def bounds(path: str, kind: types.Type) -> Iterator[tuple[str, Any]]:
         case types.VarTupleType(
             item_type=types.FloatType(ge=float() | int() as low), max_length=int() as most
         ):
-            yield path, [[float(low), math.inf]] * most
+            yield path, [[float(low), math.inf]] * most, (False, False)
 
 
 def limits() -> str:
-    """A table of the ranges that a key named in safety.unusual leaves, and one of all others."""
+    """A table of the ranges that a key named in safety.unusual leaves, and one of all others, of
+    which an end may be excluded; and keys of sections that have no default."""
     usual: dict[str, Any] = {}
     for key, index, *ends in ranges(Config):
         pair = [float(f"{end:.3g}") for end in ends]
@@ -59,18 +60,29 @@ def limits() -> str:
             usual.setdefault(key, []).append(pair)
     far = [MOST_RATIO * max(map(abs, limits)) for limits in USUAL_TRAVEL]
     usual["safety.command_travel"] = [[-one, one] for one in far]
-    read = tuple(f"{name}." for name in tomlkit.parse(defaults()) if name not in UNREAD)
-    tables = {"usual": usual, "always": dict(bounds("", types.type_info(Config)))}
+    # The others, [drives] and [actuators], have no defaults.
+    sections = tuple(f"{name}." for name in tomlkit.parse(defaults()))
+    always = [each for each in bounds("", types.type_info(Config)) if each[0].startswith(sections)]
     return tomlkit.dumps(
         {
-            name: {key: found for key, found in table.items() if key.startswith(read)}
-            for name, table in tables.items()
+            "optional": list(optional("", types.type_info(Config), tomlkit.parse(defaults()))),
+            "above": [key for key, _, (is_above, _) in always if is_above],
+            "below": [key for key, _, (_, is_below) in always if is_below],
+            "usual": {key: found for key, found in usual.items() if key.startswith(sections)},
+            "always": {key: found for key, found, _ in always},
         }
     )
 
 
-UNREAD = ("twin", "recording", "calibration", "kinematics")
-"""Sections that only Python reads."""
+def optional(path: str, kind: types.Type, known: Any) -> Iterator[str]:
+    """Keys without a default below a path, in sections that have one."""
+    assert isinstance(kind, types.StructType)
+    for field in kind.fields:
+        key = f"{path}.{field.name}".lstrip(".")
+        if field.name not in known:
+            yield key
+        elif isinstance(field.type, types.StructType):
+            yield from optional(key, field.type, known[field.name])
 
 
 @pytest.mark.parametrize(("file", "text"), [("defaults", defaults), ("ranges", limits)])

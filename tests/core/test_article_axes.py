@@ -5,7 +5,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope import Compensator, Estimator, HysteresisReduction, axes
+from tautscope import (
+    Camera,
+    Compensator,
+    Estimator,
+    HysteresisReduction,
+    Instrument,
+    Play,
+    axes,
+)
 from tautscope.errors import ConfigError, SignalError
 
 Floats = NDArray[np.float64]
@@ -143,6 +151,30 @@ def test_wrong_settings_are_named(settings: dict[str, object], field: str) -> No
     with pytest.raises((ConfigError, SignalError)) as caught:
         Compensator(**(defaults | settings))  # type: ignore[arg-type]
     assert caught.value.field == field
+
+
+LENGTHS = {"bending_length": 0.02, "marker_a": 0.004, "marker_b": 0.016}
+NUMBERS: list[tuple[type, dict[str, object]]] = [
+    (Play, {"delta_minus": -1.0, "delta_plus": 1.0, "output": 0.0}),
+    (Instrument, LENGTHS | {"radius": 0.00175, "band_length": 0.004}),
+    (Camera, {"fx": 424.0, "fy": 454.0, "cx": 349.6, "cy": 285.0}),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "field"),
+    [(kind, settings, field) for kind, settings in NUMBERS for field in settings],
+)
+def test_an_argument_that_is_no_number_is_named(
+    kind: type, settings: dict[str, object], field: str
+) -> None:
+    others = {"distortion": np.zeros(8)} if kind is Camera else {}
+    kind(**settings, **others)
+    for wrong in ("a", [1.0, 2.0], 10**400):
+        with pytest.raises(SignalError, match=f"{field}: got .*, expected a number"):
+            kind(**settings | {field: wrong}, **others)
+    with pytest.raises(SignalError, match="input: got 'x', expected a number"):
+        Play(delta_minus=-1.0, delta_plus=1.0).step("x")  # type: ignore[arg-type]
 
 
 def test_a_wrong_number_of_axes_changes_nothing() -> None:

@@ -44,7 +44,7 @@ def test_an_example_runs(example: Path) -> None:
     found = subprocess.run(
         [sys.executable, "-W", "error", example], capture_output=True, text=True, check=False
     )
-    assert found.returncode == 0, found.stderr
+    assert (found.returncode, found.stderr) == (0, "")
     assert found.stdout.strip()
     if example.stem in RESULTS:
         numbers = re.findall(r"-?\d+(?:\.\d+)?", found.stdout)

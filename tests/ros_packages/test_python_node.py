@@ -25,7 +25,8 @@ class Laboratory:
         self.node = InstrumentNode()
         assert self.node.on_configure(None) == "success"
         assert self.node.on_activate(None) == "success"
-        self.measure(START)
+        self.drives = START
+        self.are_silent = False
 
     def measure(self, position):
         message = stamped(self.node.now, name=JOINTS, position=list(position))
@@ -38,7 +39,11 @@ class Laboratory:
             if speed is not None:
                 START[0] += speed * period
                 self.refer(START)
+            if not self.are_silent:
+                self.measure(self.drives)
             tick()
+            if commands := self.node.published["actuators/setpoint_js"]:
+                self.drives = commands[-1].position
             if number % 20 == 0:
                 report()
             self.node.now += round(period * 1e9)
@@ -48,6 +53,8 @@ class Laboratory:
         self.node.callbacks["servo_jp"](message)
 
     def request(self, text):
+        if not self.are_silent:
+            self.measure(self.drives)
         self.node.callbacks["state_command"](doubles.Message(string=text))
 
     def texts(self, topic):
@@ -112,11 +119,12 @@ def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
 
 
 def test_enable_is_refused_with_a_warning_while_the_drives_are_silent(laboratory):
-    laboratory.node.on_cleanup(None)
-    laboratory.node.on_configure(None)
-    laboratory.node.on_activate(None)
+    laboratory.measure(START)
+    laboratory.run(0.1)
+    laboratory.are_silent = True
+    laboratory.run(0.2)
     laboratory.request("enable")
-    laboratory.run(0.2, speed=0.01)
+    laboratory.run(1.0, speed=0.01)
     assert laboratory.node.published["actuators/setpoint_js"] == []
     assert laboratory.states()[-1] == "DISABLED"
     assert laboratory.warnings()[-1] == "enable is refused: it is not known where the drives are"
@@ -207,10 +215,22 @@ def test_a_fault_of_the_drives_stops_them_until_it_is_cleared(laboratory):
     stops = laboratory.texts("actuators/state_command")
     assert set(stops) == {"pause"}
     assert 5 <= len(stops) <= 7
-    laboratory.measure(laboratory.node.published["actuators/setpoint_js"][-1].position)
+    for _ in range(100):
+        fault(doubles.Message(state="FAULT"))
+        laboratory.run(0.1, speed=0.01)
     laboratory.request("enable")
     laboratory.run(0.1, speed=0.01)
     assert len(laboratory.node.published["actuators/setpoint_js"]) > sent
+
+
+def test_silent_drives_stop_the_node(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.2, speed=0.01)
+    laboratory.are_silent = True
+    laboratory.run(0.2, speed=0.01)
+    assert laboratory.states()[-1] == "FAULT"
+    assert set(laboratory.texts("actuators/state_command")) == {"pause"}
+    assert laboratory.warnings()[-1] == "quick_stop: drive_fault"
 
 
 def test_bad_messages_are_reported_and_change_nothing(laboratory):
@@ -219,13 +239,21 @@ def test_bad_messages_are_reported_and_change_nothing(laboratory):
     before = laboratory.node.published["actuators/setpoint_js"][-1].position
     laboratory.node.callbacks["servo_jp"](stamped(laboratory.node.now, name=["a"], position=[1.0]))
     laboratory.node.callbacks["/endoscope/image_raw"](stamped(0, encoding="mono8", width=1))
+    wrong = stamped(laboratory.node.now, name=["b"], position=[1.0])
+    laboratory.node.callbacks["actuators/measured_js"](wrong)
     laboratory.request("home")
     info = doubles.Message(width=640, height=480, k=[0.0] * 9)
     laboratory.node.callbacks["/endoscope/camera_info"](info)
     laboratory.run(0.01)
     assert laboratory.node.published["actuators/setpoint_js"][-1].position == before
     texts = "\n".join(laboratory.node.logged)
-    for part in ("joints are missing", "mono8", "home", "640 x 480"):
+    for part in (
+        "servo_jp: joints are missing",
+        "actuators/measured_js: joints are missing",
+        "mono8",
+        "home",
+        "640 x 480",
+    ):
         assert part in texts
 
 
@@ -274,14 +302,18 @@ class TestAnotherRobot:
         node = InstrumentNode()
         assert node.on_configure(None) == "success"
         assert node.on_activate(None) == "success"
+        self.measure(node)
+        return node
+
+    def measure(self, node):
         drives = stamped(node.now, name=list(self.JOINTS), position=[0.0, 0.0])
         node.callbacks["actuators/measured_js"](drives)
-        return node
 
     def tick(self, node, reference=None):
         if reference is not None:
             message = stamped(node.now, name=list(self.JOINTS), position=list(reference))
             node.callbacks["servo_jp"](message)
+        self.measure(node)
         node.timers[0][1]()
         node.now += 5_000_000
 
@@ -307,12 +339,20 @@ class TestAnotherRobot:
         assert (label.label, label.size, label.stride) == ("bend_x,bend_y", 2, 4)
 
     def test_measurements_do_not_pile_up_without_ticks(self, node):
+        def measure():
+            for _ in range(200):
+                node.now += 10_000_000
+                node.callbacks["/left"](stamped(node.now, name=["bend_x"], position=[0.0]))
+
+        # Those from before it was activated are dropped.
         node.on_deactivate(None)
-        for _ in range(200):
-            node.now += 10_000_000
-            node.callbacks["/left"](stamped(node.now, name=["bend_x"], position=[0.0]))
+        measure()
         node.on_activate(None)
+        self.measure(node)
         node.callbacks["state_command"](doubles.Message(string="enable"))
+        self.tick(node, [0.0, 0.0])
+        assert node.published["hysteresis/delta"] == []
+        measure()
         self.tick(node, [0.0, 0.0])
         assert len(node.published["hysteresis/delta"]) == 64
 

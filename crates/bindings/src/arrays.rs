@@ -34,6 +34,11 @@ where
     })
 }
 
+/// The number of an argument.
+pub fn number(field: &str, given: &Given<'_>) -> PyResult<f64> {
+    array(field, given, "a number")
+}
+
 /// The N values of a vector.
 pub fn fixed<const N: usize>(field: &str, given: &Given<'_>) -> PyResult<[f64; N]> {
     let array: Vector<'_> = array(field, given, &format!("an array ({N},) of numbers"))?;

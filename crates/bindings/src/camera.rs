@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Given, fixed, rows, table};
+use crate::arrays::{Given, fixed, number, rows, table};
 use crate::description::described;
 use crate::errors;
 
@@ -18,13 +18,15 @@ impl Camera {
     #[pyo3(signature = (*, fx, fy, cx, cy, distortion))]
     fn new(
         py: Python<'_>,
-        fx: f64,
-        fy: f64,
-        cx: f64,
-        cy: f64,
+        fx: Given<'_>,
+        fy: Given<'_>,
+        cx: Given<'_>,
+        cy: Given<'_>,
         distortion: Given<'_>,
     ) -> PyResult<Self> {
-        core::Camera::new([fx, fy], [cx, cy], fixed("distortion", &distortion)?)
+        let focal = [number("fx", &fx)?, number("fy", &fy)?];
+        let centre = [number("cx", &cx)?, number("cy", &cy)?];
+        core::Camera::new(focal, centre, fixed("distortion", &distortion)?)
             .map(Self)
             .map_err(errors::config(py))
     }

@@ -4,7 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Given, columns, fixed, table};
+use crate::arrays::{Given, columns, fixed, number, table};
 use crate::description::described;
 use crate::errors;
 
@@ -21,15 +21,21 @@ impl Instrument {
     #[pyo3(signature = (*, bending_length, marker_a, marker_b, radius, band_length))]
     fn new(
         py: Python<'_>,
-        bending_length: f64,
-        marker_a: f64,
-        marker_b: f64,
-        radius: f64,
-        band_length: f64,
+        bending_length: Given<'_>,
+        marker_a: Given<'_>,
+        marker_b: Given<'_>,
+        radius: Given<'_>,
+        band_length: Given<'_>,
     ) -> PyResult<Self> {
-        core::Instrument::new(bending_length, marker_a, marker_b, radius, band_length)
-            .map(Self)
-            .map_err(errors::config(py))
+        core::Instrument::new(
+            number("bending_length", &bending_length)?,
+            number("marker_a", &marker_a)?,
+            number("marker_b", &marker_b)?,
+            number("radius", &radius)?,
+            number("band_length", &band_length)?,
+        )
+        .map(Self)
+        .map_err(errors::config(py))
     }
 
     /// f(q): centres of bands A and B (2, 3) in m for a state (3,) [m, rad, rad].

@@ -4,7 +4,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Given, Vector, array};
+use crate::arrays::{Given, Vector, array, number};
 use crate::description::described_with;
 use crate::errors;
 
@@ -22,16 +22,29 @@ pub struct Play {
 #[pymethods]
 impl Play {
     #[new]
-    #[pyo3(signature = (*, delta_minus, delta_plus, output=0.0))]
-    fn new(py: Python<'_>, delta_minus: f64, delta_plus: f64, output: f64) -> PyResult<Self> {
-        let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
+    #[pyo3(
+        signature = (*, delta_minus, delta_plus, output=None),
+        text_signature = "(*, delta_minus, delta_plus, output=0.0)"
+    )]
+    fn new(
+        py: Python<'_>,
+        delta_minus: Given<'_>,
+        delta_plus: Given<'_>,
+        output: Option<Given<'_>>,
+    ) -> PyResult<Self> {
+        let [minus, plus] = [
+            number("delta_minus", &delta_minus)?,
+            number("delta_plus", &delta_plus)?,
+        ];
+        let output = output.map_or(Ok(0.0), |output| number("output", &output))?;
+        let play = core::Play::new(minus, plus).map_err(errors::config(py))?;
         let state = core::PlayState { output };
         Ok(Self { play, state })
     }
 
     /// The output y for the next input v; an input that is not finite leaves it as it is.
-    fn step(&mut self, input: f64) -> f64 {
-        self.play.step(&mut self.state, input)
+    fn step(&mut self, input: Given<'_>) -> PyResult<f64> {
+        Ok(self.play.step(&mut self.state, number("input", &input)?))
     }
 
     /// `step` for inputs (n,): outputs (n,).
@@ -42,7 +55,8 @@ impl Play {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inputs: Vector<'_> = array("inputs", &inputs, "an array (n,) of numbers")?;
         let inputs = inputs.as_array();
-        let outputs = inputs.iter().map(|input| self.step(*input));
+        let outputs = inputs.iter();
+        let outputs = outputs.map(|input| self.play.step(&mut self.state, *input));
         Ok(PyArray1::from_iter(py, outputs))
     }
 

@@ -92,19 +92,25 @@ impl Configuration {
         };
         let has_axes = !entries.is_empty();
         let read: &[&str] = if has_axes { &OF_AXES } else { &OF_ARTICLE };
+        let ranges = Ranges::new()?;
         for (name, own) in given {
             let name = name.as_str();
             match table.get_mut(name) {
                 Some(default) if !default.is_table() => *default = own,
                 // It has no defaults, and only Python reads it.
-                _ if name == "drives" => {}
+                _ if name == "drives" && own.is_table() => {}
+                _ if name == "drives" => return Err(no_table(name, &own)),
                 _ if name == "actuators" => check_actuators(&own)?,
                 None => return Err(unknown(name)),
-                Some(_) if has_axes && name == "kinematics" => check_kinematics(&own)?,
-                Some(section) if read.contains(&name) => {
-                    merge(section, &own, name, &[], has_axes)?;
+                Some(section) => {
+                    let is_read = read.contains(&name);
+                    if has_axes && name == "kinematics" {
+                        check_kinematics(&own)?;
+                    } else if !is_read {
+                        check_unused(name, &own, section, has_axes)?;
+                    }
+                    merge(section, &own, name, &ranges.optional, has_axes && is_read)?;
                 }
-                Some(default) => check_unused(name, &own, default, has_axes)?,
             }
         }
         let dofs = if has_axes {
@@ -115,7 +121,7 @@ impl Configuration {
             let names = [("insertion", "m"), ("rotation", "rad"), ("bending", "rad")];
             names.map(|(name, unit)| Dof::new(name, unit)).into()
         };
-        Ranges::new()?.check(&table)?;
+        ranges.check(&table)?;
         let configuration = Self { table, dofs };
         configuration.check()?;
         Ok(configuration)
@@ -123,6 +129,7 @@ impl Configuration {
 
     /// Relations between values, of which an error of the core would not name the degree of freedom.
     fn check(&self) -> Result<(), Error> {
+        self.check_references()?;
         if !self.has_axes() {
             return self.check_article();
         }
@@ -164,15 +171,49 @@ impl Configuration {
         Ok(())
     }
 
+    /// References that are followed, and noise that is not taken for contact.
+    fn check_references(&self) -> Result<(), Error> {
+        let References { safety, experiment } = self.read()?;
+        let Safety { safety: limits } = self.read()?;
+        let sines = [
+            ("insertion", experiment.insertion),
+            ("rotation", experiment.rotation),
+            ("bending", experiment.bending),
+        ];
+        for (index, (name, sine)) in sines.into_iter().enumerate() {
+            let least = 2.0 * std::f64::consts::PI * sine.amplitude / limits.reference_speed[index];
+            if sine.period < least && !limits.off.contains(core::Flag::ReferenceFast) {
+                return Err(Error(format!(
+                    "experiment.{name}.period: got {}, expected at least {least}: safety.reference_speed limits faster references",
+                    sine.period
+                )));
+            }
+            let dof = self.article_dof(name)?;
+            let (noise, tolerance) = (
+                safety.state_noise[index],
+                dof.contact_tolerance * dof.update_distance,
+            );
+            if !(noise >= 0.0 && 3.0 * noise < tolerance) {
+                return Err(Error(format!(
+                    "safety.state_noise[{index}]: got {noise}, expected less than a third of {name}.contact_tolerance times {name}.update_distance = {tolerance}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn article_dof(&self, name: &str) -> Result<core::DofSettings, Error> {
+        let own = self.table[name].clone();
+        own.try_into()
+            .map_err(|error| Error::of_value(&error, &format!("{name}.")))
+    }
+
     fn check_article(&self) -> Result<(), Error> {
         self.check_bands()?;
         let Safety { safety } = self.read()?;
         let is_limited = !safety.off.contains(core::Flag::WidthLimit);
         for (Dof { name, .. }, limit) in self.dofs.iter().zip(safety.offset_limit) {
-            let dof: core::DofSettings = self.table[name]
-                .clone()
-                .try_into()
-                .map_err(|error| Error::of_value(&error, &format!("{name}.")))?;
+            let dof = self.article_dof(name)?;
             check_dof(&dof).map_err(|error| Error(format!("{name}.{error}")))?;
             let offsets = [
                 ("delta_minus", dof.delta_minus),
@@ -294,6 +335,30 @@ struct Bands {
 }
 
 #[derive(serde::Deserialize)]
+struct References {
+    safety: StateNoise,
+    experiment: Experiment,
+}
+
+#[derive(serde::Deserialize)]
+struct StateNoise {
+    state_noise: [f64; 3],
+}
+
+#[derive(serde::Deserialize)]
+struct Experiment {
+    insertion: Sine,
+    rotation: Sine,
+    bending: Sine,
+}
+
+#[derive(serde::Deserialize)]
+struct Sine {
+    amplitude: f64,
+    period: f64,
+}
+
+#[derive(serde::Deserialize)]
 struct Safety {
     safety: core::SafetySettings,
 }
@@ -333,7 +398,8 @@ fn axes(entries: Vec<Value>, mut default: Table) -> Result<(Value, Vec<Dof>), Er
     for (index, own) in entries.into_iter().enumerate() {
         let path = format!("dof[{index}]");
         let mut entry = Value::Table(default.clone());
-        merge(&mut entry, &own, &path, &OPTIONAL, true)?;
+        let optional = OPTIONAL.map(|key| format!("{path}.{key}"));
+        merge(&mut entry, &own, &path, &optional, true)?;
         if entry.get("width_limit").is_none() {
             return Err(Error(format!(
                 "{path}.width_limit: expected a value: it has no default"
@@ -419,22 +485,20 @@ fn check_kinematics(own: &Value) -> Result<(), Error> {
     }
 }
 
-/// Takes the values of a section; one that is empty among the defaults has keys of the user's.
+/// Takes the values of a section; one that is empty among the defaults has keys of the user's. `optional` has those without a default.
 fn merge(
     section: &mut Value,
     own: &Value,
     name: &str,
-    optional: &[&str],
+    optional: &[String],
     has_axes: bool,
 ) -> Result<(), Error> {
     let (Value::Table(own), Some(section)) = (own, section.as_table_mut()) else {
-        return Err(Error(format!(
-            "{name}: got {}, expected a table",
-            own.type_str()
-        )));
+        return Err(no_table(name, own));
     };
     let is_free = section.is_empty();
     for (key, value) in own {
+        let path = format!("{name}.{key}");
         let default = section.get_mut(key);
         let is_of_article = key == "frozen_travel"
             || default
@@ -443,26 +507,24 @@ fn merge(
                 .is_some_and(|all| all.len() == 3);
         let is_of_images = name == "estimation" && OF_IMAGES.contains(&key.as_str());
         if has_axes && is_of_images && default.as_deref() != Some(value) {
-            return Err(Error(format!("{name}.{key}: not used with [[dof]]")));
+            return Err(Error(format!("{path}: not used with [[dof]]")));
         }
         if has_axes && is_of_article && default.as_deref() != Some(value) {
             return Err(Error(format!(
-                "{name}.{key}: not used with [[dof]], which has its own"
+                "{path}: not used with [[dof]], which has its own"
             )));
         }
         match default {
             Some(default) if default.is_table() => {
-                merge(default, value, &format!("{name}.{key}"), &[], has_axes)?;
+                merge(default, value, &path, optional, has_axes)?;
             }
             Some(default) if kind(default) != kind(value) => {
                 let found = value.as_str().map(|text| format!("{text:?}"));
                 let found = found.unwrap_or_else(|| value.type_str().into());
                 let kind = kind(default);
-                return Err(Error(format!("{name}.{key}: got {found}, expected {kind}")));
+                return Err(Error(format!("{path}: got {found}, expected {kind}")));
             }
-            None if !is_free && !optional.contains(&key.as_str()) => {
-                return Err(unknown(&format!("{name}.{key}")));
-            }
+            None if !is_free && !optional.contains(&path) => return Err(unknown(&path)),
             _ => {
                 section.insert(key.clone(), value.clone());
             }
@@ -477,6 +539,10 @@ fn kind(value: &Value) -> &'static str {
         Value::Integer(_) | Value::Float(_) => "a number",
         other => other.type_str(),
     }
+}
+
+fn no_table(name: &str, own: &Value) -> Error {
+    Error(format!("{name}: got {}, expected a table", own.type_str()))
 }
 
 fn unknown(name: &str) -> Error {

@@ -10,6 +10,12 @@ const RANGES: &str = include_str!("ranges.toml");
 /// Least and largest values by key: a pair, or one for each item of a list.
 #[derive(serde::Deserialize)]
 pub(crate) struct Ranges {
+    /// Keys without a default.
+    pub(crate) optional: Vec<String>,
+    /// Keys of `always` whose number is above the least value, not equal to it.
+    above: Vec<String>,
+    /// Keys of `always` whose number is below the largest value, not equal to it.
+    below: Vec<String>,
     /// Of the keys that `safety.unusual` may name.
     usual: Table,
     always: Table,
@@ -40,12 +46,14 @@ impl Ranges {
             Number::collect(value, name.clone(), name.clone(), None, &mut numbers);
         }
         numbers.iter().try_for_each(|number| {
-            if unusual.contains(&number.key) {
-                return number.check(None, "");
+            let key = &number.key;
+            if unusual.contains(key) {
+                return number.check(None, [false; 2], "");
             }
-            match self.usual.get(&number.key) {
-                None => number.check(self.always.get(&number.key), ""),
-                range => number.check(range, ", or named in safety.unusual"),
+            let open = [&self.above, &self.below].map(|keys| keys.contains(key));
+            match self.usual.get(key) {
+                None => number.check(self.always.get(key), open, ""),
+                range => number.check(range, open, ", or named in safety.unusual"),
             }
         })
     }
@@ -100,7 +108,8 @@ impl Number {
         });
     }
 
-    fn check(&self, range: Option<&Value>, waiver: &str) -> Result<(), Error> {
+    /// `open` is whether each end of the range is excluded.
+    fn check(&self, range: Option<&Value>, open: [bool; 2], waiver: &str) -> Result<(), Error> {
         let Self {
             path, item, value, ..
         } = self;
@@ -115,14 +124,23 @@ impl Number {
         if let (Some(ranges), None) = (of_items, range) {
             return wrong(format!("a list of at most {}", ranges.len()));
         }
-        match range.and_then(|range| range.clone().try_into::<(f64, f64)>().ok()) {
-            Some((low, high)) if high.is_infinite() && *value < low => {
-                wrong(format!("at least {low}{waiver}"))
-            }
-            Some((low, high)) if !(low..=high).contains(value) => {
-                wrong(format!("{low} to {high}{waiver}"))
-            }
-            _ => Ok(()),
+        let Some((low, high)) = range.and_then(|range| range.clone().try_into::<(f64, f64)>().ok())
+        else {
+            return Ok(());
+        };
+        let [is_above, is_below] = open;
+        let is_at_open_end = is_above && *value <= low || is_below && *value >= high;
+        if (low..=high).contains(value) && !is_at_open_end {
+            return Ok(());
         }
+        let least = if is_above { "above" } else { "at least" };
+        let most = if is_below { "below" } else { "at most" };
+        wrong(if high.is_infinite() {
+            format!("{least} {low}{waiver}")
+        } else if open == [false; 2] {
+            format!("{low} to {high}{waiver}")
+        } else {
+            format!("{least} {low}, {most} {high}{waiver}")
+        })
     }
 }

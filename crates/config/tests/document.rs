@@ -132,6 +132,18 @@ fn errors_name_the_key() {
             "vision.least_inside: got NaN",
         ),
         (
+            "vision.least_inside = 0.0".into(),
+            "vision.least_inside: got 0, expected above 0, below 1",
+        ),
+        (
+            "vision.clear.least_edges = 1".into(),
+            "vision.clear.least_edges: got 1, expected above 0, below 1",
+        ),
+        (
+            "rotation.recovery = 1.0".into(),
+            "rotation.recovery: got 1, expected at least 0, below 1",
+        ),
+        (
             "control.period = 0.001".into(),
             "control.history: got 2, expected at most 1024 control periods",
         ),
@@ -223,6 +235,70 @@ fn both_bands_are_on_the_tip() {
 }
 
 #[test]
+fn noise_is_less_than_a_contact_and_references_are_followed() {
+    check_errors(&[
+        (
+            "profile = \"paper\"\ninsertion.update_distance = 2e-5".into(),
+            "safety.state_noise[0]: got 0.00003, expected less than a third of insertion.contact_tolerance times insertion.update_distance = 0.000008",
+        ),
+        (
+            "safety.state_noise = [3e-5, -1.0, 0.0015]".into(),
+            "safety.state_noise[1]: got -1, expected less than a third",
+        ),
+        (
+            "experiment.bending.period = 1.0".into(),
+            "experiment.bending.period: got 1, expected at least 2.827",
+        ),
+    ]);
+    let fast = "safety.off = [\"reference_fast\"]\nexperiment.bending.period = 1.0";
+    assert!(Configuration::parse(fast).is_ok());
+}
+
+#[test]
+fn sections_that_are_not_read_are_checked() {
+    let dof = |keys: &str| format!("{ONE}{keys}");
+    check_errors(&[
+        (
+            dof("[kinematics]\nknid = \"two_planes\""),
+            "kinematics.knid: unknown key",
+        ),
+        (
+            format!("kinematics = 3\n{ONE}"),
+            "kinematics: got integer, expected a table",
+        ),
+        (dof("[camera]\nfxx = 1"), "camera.fxx: unknown key"),
+        (
+            dof("[camera]\nfx = 1"),
+            "camera.fx: got 1, expected 14.1 to 12700",
+        ),
+        (dof("[twin]\nsead = 1"), "twin.sead: unknown key"),
+        ("[twin]\nsead = 1".into(), "twin.sead: unknown key"),
+        (
+            "[twin.sensor]\nreadout = \"x\"".into(),
+            "twin.sensor.readout: got \"x\", expected a number",
+        ),
+        (
+            "twin.bends = 7".into(),
+            "twin.bends: got 7, expected 0 to 6",
+        ),
+        (
+            "recording = 1".into(),
+            "recording: got integer, expected a table",
+        ),
+        ("drives = 1".into(), "drives: got integer, expected a table"),
+    ]);
+    let accepted = "safety.unusual = [\"twin.latency\"]\ntwin.latency = 60.0\ntwin.sensor.jpeg_quality = 90\n\
+        twin.background = \"a.png\"\ncalibration.camera.date = \"2026-01-01\"\n";
+    for text in [
+        accepted.into(),
+        format!("{accepted}{ONE}[camera]\nwidth = 640"),
+    ] {
+        let found = Configuration::parse(&text);
+        assert!(found.is_ok(), "{:?}", found.err());
+    }
+}
+
+#[test]
 fn a_delay_is_within_history_and_age() {
     check_errors(&[
         (
@@ -289,7 +365,7 @@ fn errors_name_the_degree_of_freedom() {
         ),
         (
             second("").replace("1.0\n[[", "-1.0\n[["),
-            "dof[0].width_limit: got -1, expected 0 to 100",
+            "dof[0].width_limit: got -1, expected above 0, at most 100",
         ),
         (
             dof("unit = \"m\"").replace("1.0", "12"),
@@ -364,7 +440,7 @@ fn numbers_have_the_ranges_of_python() {
         ),
         (
             dof("lever = 101"),
-            "dof[0].lever: got 101, expected 0 to 100",
+            "dof[0].lever: got 101, expected above 0, at most 100",
         ),
         (dof("[safety]\nstall = 1e4"), "safety.stall: got 10000"),
     ]);

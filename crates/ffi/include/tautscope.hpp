@@ -303,15 +303,18 @@ public:
     explicit Loop(std::string_view toml) : AnyLoop(toml) {}
 
     /// One control tick at `time` [s]: the command for a reference, made at `made_at` [s] if that is known.
-    Vector step(View<3> reference, double time, double made_at = unknown) {
+    Vector step(Numbers reference, double time, double made_at = unknown) {
         Vector command;
         check(try_step(reference, time, command, made_at));
         return command;
     }
 
-    /// As `step`, without exceptions: with any result but OK, `command` is the last one.
-    TautscopeResult try_step(View<3> reference, double time, Vector &command, double made_at = unknown) noexcept {
-        return tautscope_loop_step(handle_.get(), command.size(), reference.data(), made_at, time, command.data());
+    /// As `step`, without exceptions: with any result but OK, `command` is the last one; it stays as it is for a reference
+    /// of another size, or a loop that cannot be used any more.
+    TautscopeResult try_step(Numbers reference, double time, Vector &command, double made_at = unknown) noexcept {
+        // A loop with another number of `[[dof]]` would write as many.
+        const std::size_t count = dofs() == command.size() ? reference.size() : command.size();
+        return tautscope_loop_step(handle_.get(), count, reference.data(), made_at, time, command.data());
     }
 
     /// Image update with centroids u, v of both bands [px]; two NaN for a band that was not found.

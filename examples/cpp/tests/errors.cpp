@@ -59,6 +59,13 @@ void check_configuration(const std::string &toml) {
     const auto detector = [](const std::string &text) { return thrown([&] { tautscope::Detector created(text); }); };
     FAILS(detector(replaced(toml, "pixel_format = \"bgr\"", "pixel_format = \"hsv\"")), CONFIG, "camera.pixel_format");
     FAILS(detector(replaced(toml, "smoothing = ", "smoothing = 9")), CONFIG, "smoothing");
+    // With `[[dof]]`, which no loop of bands has, it is of the camera that is given.
+    const std::string robot = "[[dof]]\nname = \"a\"\nwidth_limit = 1\n";
+    FAILS(detector(robot + "[camera]\nfxx = 1"), CONFIG, "camera.fxx: unknown key");
+    tautscope::Detector small(robot + "[camera]\nwidth = 64\nheight = 48");
+    std::vector<std::uint8_t> pixels(64 * 48 * 3, 90);
+    const TautscopeImage image{pixels.data(), pixels.size(), 64 * 3, 64, 48, TAUTSCOPE_PIXEL_FORMAT_BGR};
+    EXPECT(thrown([&] { small.detect(image); }) == TAUTSCOPE_RESULT_OK);
     TautscopeLoop *untouched = nullptr;
     FAILS(tautscope_loop_create(nullptr, 0, &untouched), NULL_POINTER, "toml");
     EXPECT(untouched == nullptr);
@@ -91,6 +98,10 @@ void check_step(const std::string &toml) {
     EXPECT(loop.step(second, 0.001) == undisturbed.step(second, 0.001));
     const std::vector<double> two{0.025, 0.0};
     EXPECT(thrown([&] { loop.step(two, 0.002); }) == TAUTSCOPE_RESULT_SIZE);
+    FAILS(loop.try_step(two, 0.002, command), SIZE, "dofs: got 2, expected 3");
+    tautscope::Loop of_four("[[dof]]\nname = \"a\"\nwidth_limit = 1\n[[dof]]\nname = \"b\"\nwidth_limit = 1\n"
+                            "[[dof]]\nname = \"c\"\nwidth_limit = 1\n[[dof]]\nname = \"d\"\nwidth_limit = 1\n");
+    FAILS(of_four.try_step({0.0, 0.0, 0.0, 0.0}, 0.0, command), SIZE, "dofs: got 3, expected 4");
     const std::vector<double> three{0.025, 0.0, 0.9};
     EXPECT(thrown([&] { loop.step(three, 0.002); }) == TAUTSCOPE_RESULT_OK);
 }

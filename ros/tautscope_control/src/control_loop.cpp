@@ -9,6 +9,8 @@ namespace tautscope_control {
 namespace {
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+/// Longest time without positions from the drives, as `DRIVER_TIMEOUT` of tautscope.ros2.driver [s].
+constexpr double driver_timeout = 0.1;
 
 bool contains(std::uint32_t requests, Request request) noexcept {
     return (requests & static_cast<std::uint32_t>(request)) != 0;
@@ -40,7 +42,7 @@ std::string flag_names(std::uint32_t flags) {
 
 ControlLoop::ControlLoop(const std::string &toml)
     : loop_(toml), start_tolerance_(loop_.dofs()), period_(loop_.period()), measured_(loop_.dofs(), unknown), reference_(measured_),
-      used_(measured_), command_(measured_), made_at_(unknown), engaged_at_(unknown) {
+      used_(measured_), command_(measured_), measured_at_(unknown), made_at_(unknown), engaged_at_(unknown) {
     for (std::size_t dof = 0; dof < loop_.dofs(); ++dof) {
         const char *name = "", *unit = "";
         tautscope::check(tautscope_loop_dof(loop_.handle(), dof, &name, &unit));
@@ -57,11 +59,16 @@ bool ControlLoop::is_finite(Numbers values) const noexcept {
            std::all_of(values.data(), values.data() + values.size(), [](double value) { return std::isfinite(value); });
 }
 
-void ControlLoop::set_measured(Numbers position) noexcept {
-    if (is_finite(position)) {
+bool ControlLoop::set_measured(Numbers position, double time) noexcept {
+    const bool is_known = is_finite(position);
+    if (is_known) {
         measured_ = Values(position);
+        measured_at_ = time;
     }
+    return is_known;
 }
+
+bool ControlLoop::is_measured(double time) const noexcept { return std::abs(time - measured_at_) <= driver_timeout; }
 
 bool ControlLoop::set_reference(Numbers position, double made_at) noexcept {
     const bool is_new = is_finite(position);
@@ -80,6 +87,9 @@ Tick ControlLoop::step(double time) noexcept {
     const double share = wanted_share_.load(std::memory_order_relaxed);
     if (share != share_ && tautscope_loop_set_compensation(loop_.handle(), share) == TAUTSCOPE_RESULT_OK) {
         share_ = share;
+    }
+    if (!is_measured(time)) {
+        raise_drive_fault();
     }
     if (state_ == OperatingState::disabled) {
         has_new_reference_ = false;
@@ -137,14 +147,14 @@ void ControlLoop::apply_requests(double time) noexcept {
         tautscope_loop_acknowledge(loop_.handle());
     }
     for (const StateCommand &command : state_commands) {
-        if (command.request == Request::disable && contains(requests, Request::drive_fault) && state_ != OperatingState::disabled) {
-            tautscope_loop_raise_flag(loop_.handle(), TAUTSCOPE_FLAG_DRIVE_FAULT);
+        if (command.request == Request::disable && contains(requests, Request::drive_fault)) {
+            raise_drive_fault();
         }
         if (contains(requests, command.request) && ((command.states >> static_cast<unsigned>(state_)) & 1U) != 0) {
             goal_ = command.goal;
             is_unmeasured_ = false;
             if (command.request == Request::enable) {
-                enable();
+                enable(time);
                 engaged_at_ = time;
             } else if (command.request == Request::resume) {
                 engage();
@@ -158,8 +168,18 @@ void ControlLoop::apply_requests(double time) noexcept {
     }
 }
 
-void ControlLoop::enable() noexcept {
-    if (!is_finite(measured_)) {
+void ControlLoop::raise_drive_fault() noexcept {
+    // Drives repeat it; a flag that is raised again after `safety.hold_time` could not be cleared any more.
+    constexpr std::uint32_t flag = TAUTSCOPE_FLAG_DRIVE_FAULT;
+    TautscopeSupervision now{};
+    if (state_ != OperatingState::disabled && tautscope_loop_supervision(loop_.handle(), &now) == TAUTSCOPE_RESULT_OK &&
+        ((now.flags >> flag) & 1U) == 0) {
+        tautscope_loop_raise_flag(loop_.handle(), flag);
+    }
+}
+
+void ControlLoop::enable(double time) noexcept {
+    if (!is_measured(time)) {
         goal_ = OperatingState::disabled;
         is_unmeasured_ = true;
         return;

@@ -71,19 +71,16 @@ public:
     }
 
     CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
-        Values measured(reference_interfaces_.size());
-        for (std::size_t i = 0; i < measured.size(); ++i) {
-            measured[i] = read(state_interfaces_[i]).value_or(unknown);
-            reference_interfaces_[i] = unknown;
-        }
-        if (std::any_of(measured.begin(), measured.end(), [](double value) { return !std::isfinite(value); })) {
+        std::fill(reference_interfaces_.begin(), reference_interfaces_.end(), unknown);
+        if (!measure()) {
             RCLCPP_ERROR(get_node()->get_logger(), "It is not known where the drives are: a state interface has no number");
             return CallbackReturn::FAILURE;
         }
         used_message_ = received_.readFromRT()->number;
-        // What was measured before is dropped.
+        // What was requested and measured before is dropped.
+        session_->control().post(Request::disable);
+        session_->control().step(session_->now());
         session_->control().exchange();
-        session_->control().set_measured(measured);
         session_->control().post(Request::enable);
         return CallbackReturn::SUCCESS;
     }
@@ -127,6 +124,7 @@ protected:
 
     return_type update_and_write_commands(const rclcpp::Time &, const rclcpp::Duration &) override {
         ControlLoop &control = session_->control();
+        measure();
         control.set_reference(reference_interfaces_, is_in_chained_mode() ? unknown : made_at_);
         // Of the clock of the images; the time given is that of the controller manager.
         const Tick tick = control.step(session_->now());
@@ -145,6 +143,15 @@ private:
         double made_at = unknown;
         std::uint64_t number = 0;
     };
+
+    /// Hands the positions of the drives to the loop. Returns false if one is not known.
+    bool measure() noexcept {
+        Values measured(state_interfaces_.size());
+        for (std::size_t i = 0; i < measured.size(); ++i) {
+            measured[i] = read(state_interfaces_[i]).value_or(unknown);
+        }
+        return session_->control().set_measured(measured, session_->now());
+    }
 
     InterfaceConfiguration positions_of_joints() const {
         InterfaceConfiguration configuration{controller_interface::interface_configuration_type::INDIVIDUAL, {}};

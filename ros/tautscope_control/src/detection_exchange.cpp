@@ -43,7 +43,7 @@ const TautscopeReport *DetectionExchange::take_report() noexcept {
 bool DetectionExchange::is_free() const noexcept { return phase_.load(std::memory_order_acquire) == Phase::free; }
 
 bool DetectionExchange::serve(tautscope::Loop &loop, bool is_used) noexcept {
-    bool is_updated = is_used && serve_image(loop);
+    bool is_updated = serve_image(loop, is_used);
     for (Measurement given; measurements.pop(given);) {
         const TautscopeMeasurement tip{given.values.data(), given.values.size(), nullptr, given.captured_at, given.sensor, 0};
         TautscopeTipReport report{};
@@ -51,14 +51,19 @@ bool DetectionExchange::serve(tautscope::Loop &loop, bool is_used) noexcept {
         if (is_used && tautscope_loop_on_tip(loop.handle(), &tip, &report) == TAUTSCOPE_RESULT_OK) {
             reports.push(report);
             is_updated = true;
+        } else {
+            ++refused;
         }
     }
     return is_updated;
 }
 
-bool DetectionExchange::serve_image(tautscope::Loop &loop) noexcept {
+bool DetectionExchange::serve_image(tautscope::Loop &loop, bool is_used) noexcept {
     switch (phase_.load(std::memory_order_acquire)) {
     case Phase::requested: {
+        if (!is_used) {
+            return false; // The detection thread withdraws it.
+        }
         // Taken before it is read: the request may be withdrawn at any time.
         Phase expected = Phase::requested;
         if (!phase_.compare_exchange_strong(expected, Phase::serving, std::memory_order_acq_rel)) {
@@ -73,8 +78,7 @@ bool DetectionExchange::serve_image(tautscope::Loop &loop) noexcept {
     case Phase::detected: {
         report_ = TautscopeReport{};
         report_.size = sizeof report_;
-        const TautscopeResult result = tautscope_loop_on_detection(loop.handle(), &detection_, captured_at_, &report_);
-        const bool is_used = result == TAUTSCOPE_RESULT_OK;
+        is_used = is_used && tautscope_loop_on_detection(loop.handle(), &detection_, captured_at_, &report_) == TAUTSCOPE_RESULT_OK;
         phase_.store(is_used ? Phase::reported : Phase::free, std::memory_order_release);
         return is_used;
     }

@@ -46,8 +46,10 @@ public:
         });
         actuators_measured_ =
             create_subscription<JointState>("actuators/measured_js", latest, [this](const JointState &message) {
-                if (nanoseconds(message.header.stamp) != 0) {
-                    session_->control().set_measured(positions(message, session_->joints()));
+                // CRTK: a stamp of 0 marks what is not valid. Others count by their arrival.
+                if (nanoseconds(message.header.stamp) != 0 &&
+                    !session_->control().set_measured(positions(message, session_->joints()), session_->now())) {
+                    RCLCPP_WARN_THROTTLE(get_logger(), *get_clock(), 1000, "actuators/measured_js: joints are missing");
                 }
             });
         actuators_state_ = create_subscription<crtk_msgs::msg::OperatingState>(
@@ -66,6 +68,8 @@ public:
         // What was requested before is not executed now.
         session_->control().post(Request::disable);
         session_->control().step(session_->now());
+        // Nor is what was measured before used.
+        session_->control().exchange();
         const auto period = rclcpp::Duration::from_seconds(session_->control().period());
         tick_ = rclcpp::create_timer(this, get_clock(), period, [this] { tick(); });
         report_ = rclcpp::create_timer(this, get_clock(), rclcpp::Duration::from_seconds(0.1), [this] { report(); });

@@ -30,6 +30,14 @@ std_msgs::msg::MultiArrayDimension dimension(const std::string &label, std::uint
     return dimension;
 }
 
+std::string joined(const std::vector<std::string> &names) {
+    std::string text;
+    for (const std::string &name : names) {
+        text += text.empty() ? name : ", " + name;
+    }
+    return text;
+}
+
 bool is_refused(const Status &status) { return status.is_misplaced || status.is_unmeasured; }
 
 std::string description(const Status &status) {
@@ -77,9 +85,9 @@ std::shared_ptr<Session> Session::create(rclcpp_lifecycle::LifecycleNode &node, 
     for (std::uint32_t sensor = 0; sensor < topics.size() && !session->control_.has_bands(); ++sensor) {
         session->sensors_.push_back(node.create_subscription<sensor_msgs::msg::JointState>(
             topics[sensor], rclcpp::SensorDataQoS().keep_last(10),
-            [weak = std::weak_ptr<Session>(session), sensor](const sensor_msgs::msg::JointState &message) {
+            [weak = std::weak_ptr<Session>(session), topic = topics[sensor], sensor](const sensor_msgs::msg::JointState &message) {
                 if (const auto session = weak.lock()) {
-                    session->on_measurement(message, sensor);
+                    session->on_measurement(message, topic, sensor);
                 }
             }));
     }
@@ -176,11 +184,17 @@ template <class Report> void Session::on_report(const Report &report) {
     delta_->publish(delta);
 }
 
-void Session::on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor) {
+void Session::on_measurement(const sensor_msgs::msg::JointState &message, const std::string &topic, std::uint32_t sensor) {
     publish_reports();
     const Values values = positions(message, control_.dofs());
     const double captured_at = seconds(nanoseconds(message.header.stamp));
-    const bool is_known = std::any_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+    const bool is_known = std::any_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); }) &&
+                          std::none_of(values.begin(), values.end(), [](double value) { return std::isinf(value); });
+    // NaN was not measured.
+    if (!is_known && std::none_of(message.position.begin(), message.position.end(), [](double value) { return std::isnan(value); })) {
+        RCLCPP_WARN_THROTTLE(logger_, *clock_, 1000, "%s: got %zu positions of [%s], expected finite ones of [%s]", topic.c_str(),
+                             message.position.size(), joined(message.name).c_str(), joined(control_.dofs()).c_str());
+    }
     ++counts_.arrived;
     counts_.refused += is_known && control_.detection().measurements.push({values, captured_at, sensor}) ? 0 : 1;
 }
@@ -236,7 +250,8 @@ void Session::publish_diagnostics(const Status &status, const rclcpp::Time &now)
     about.level = is_refused(status) || status.reaction >= TAUTSCOPE_REACTION_HOLD_MOTION ? Level::ERROR
                   : status.flags != 0 || status.latched != 0                               ? Level::WARN
                                                                                           : Level::OK;
-    const ImageCounts counts = worker_ ? worker_->counts() : counts_;
+    ImageCounts counts = worker_ ? worker_->counts() : counts_;
+    counts.refused += control_.detection().refused;
     const std::string what = worker_ ? "images" : "measurements";
     about.values = {
         key_value("operating_state", name(status.state)),

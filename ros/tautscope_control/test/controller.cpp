@@ -14,6 +14,8 @@
 #include <vector>
 
 #include <controller_interface/chainable_controller_interface.hpp>
+#include <crtk_msgs/msg/operating_state.hpp>
+#include <crtk_msgs/msg/string_stamped.hpp>
 #include <pluginlib/class_loader.hpp>
 #include <rcl/time.h>
 #include <rclcpp/rclcpp.hpp>
@@ -166,7 +168,6 @@ void chained_references_give_the_commands_of_the_loop(Loader &loader, const std:
     rig.configure();
     rig.activate(true);
     tautscope_control::ControlLoop expected(tautscope::read_file(recording + ".toml"));
-    expected.set_measured(start);
     expected.post(tautscope_control::Request::enable);
     const auto ticks = read_rows<Tick>(recording + ".ticks");
     std::size_t wrong = 0, moved = 0;
@@ -176,7 +177,9 @@ void chained_references_give_the_commands_of_the_loop(Loader &loader, const std:
         const auto before = rig.command;
         EXPECT(rig.update(nanoseconds) == return_type::OK);
         expected.set_reference(ticks[tick].reference, std::nan(""));
-        const auto wanted = expected.step(1e-9 * static_cast<double>(nanoseconds)).command;
+        const double now = 1e-9 * static_cast<double>(nanoseconds);
+        expected.set_measured(start, now);
+        const auto wanted = expected.step(now).command;
         wrong += std::memcmp(wanted.data(), rig.command.data(), wanted.size() * sizeof(double)) != 0;
         moved += rig.command != before;
     }
@@ -210,7 +213,6 @@ void a_robot_has_its_degrees_of_freedom_and_finds_their_slack(Loader &loader, co
     Rig rig(loader, recording + ".toml", {"bend", "slide"}, Numbers{0.0, 0.0}, 200);
     rig.configure();
     tautscope_control::ControlLoop expected(tautscope::read_file(recording + ".toml"));
-    expected.set_measured(Numbers{0.0, 0.0});
     expected.post(tautscope_control::Request::enable);
     const auto publisher = rclcpp::create_publisher<sensor_msgs::msg::JointState>(rig.node(), encoders, rclcpp::QoS(10));
     std::size_t arrived = 0, sent = 0, wrong = 0, reports = 0;
@@ -260,6 +262,7 @@ void a_robot_has_its_degrees_of_freedom_and_finds_their_slack(Loader &loader, co
         rig.refer(now.reference);
         EXPECT(rig.update(nanoseconds) == return_type::OK);
         expected.set_reference(now.reference, std::nan(""));
+        expected.set_measured(Numbers{0.0, 0.0}, 1e-9 * static_cast<double>(nanoseconds));
         const auto wanted = expected.step(1e-9 * static_cast<double>(nanoseconds)).command;
         expected.exchange();
         wrong += std::memcmp(wanted.data(), rig.command.data(), sizeof tip) != 0;
@@ -274,6 +277,45 @@ void a_robot_has_its_degrees_of_freedom_and_finds_their_slack(Loader &loader, co
     EXPECT(wrong == 0 && sent > 900 && reports == sent - 1 && allocations == 0 && delta.size() == 4 && last.name == rig.joints);
     EXPECT(delta.size() == 4 && std::abs(delta[1] - delta[0] - ends[0]) < 0.02 && std::abs(delta[3] - delta[2] - ends[1]) < 0.2e-3);
     EXPECT(last.position.size() == 2 && std::abs(last.position[0] - tip[0]) < 0.1 && std::abs(last.position[1] - tip[1]) < 1e-3);
+}
+
+void what_was_requested_before_is_not_executed_when_it_is_activated(Loader &loader, const std::string &recording) {
+    for (const char *request : {"disable", "pause"}) {
+        Rig rig(loader, recording + ".toml");
+        rig.configure();
+        std::string state;
+        const auto states = rig.node().create_subscription<crtk_msgs::msg::OperatingState>(
+            "/instrument/operating_state", rclcpp::QoS(1), [&](const crtk_msgs::msg::OperatingState &message) { state = message.state; });
+        crtk_msgs::msg::StringStamped message;
+        message.string = request;
+        const auto publisher =
+            rclcpp::create_publisher<crtk_msgs::msg::StringStamped>(rig.node(), "/instrument/state_command", rclcpp::QoS(10));
+        publisher->publish(message);
+        for (int spin = 0; spin < 100; ++spin) {
+            rig.spin();
+        }
+        rig.activate(true);
+        rig.refer(start);
+        EXPECT(rig.update(0) == return_type::OK);
+        for (int spin = 0; spin < 1000 && state != "ENABLED"; ++spin) {
+            rig.spin();
+        }
+        EXPECT(state == "ENABLED");
+    }
+}
+
+void a_position_that_is_not_known_any_more_is_an_error(Loader &loader, const std::string &recording) {
+    Rig rig(loader, recording + ".toml");
+    rig.configure();
+    rig.activate(true);
+    return_type result = return_type::OK;
+    int tick = 0;
+    for (; tick < 1000 && result == return_type::OK; ++tick) {
+        rig.refer(start);
+        rig.measured[1] = tick < 500 ? rig.measured[1] : std::nan("");
+        result = rig.update(tick * 1000000LL);
+    }
+    EXPECT(result == return_type::ERROR && tick > 500 && tick < 610);
 }
 
 void references_of_a_topic_stop_with_their_device(Loader &loader, const std::string &recording) {
@@ -340,6 +382,8 @@ int main(int count, char **arguments) {
         const std::string recording = count == 3 ? arguments[1] : "best", tip = count == 3 ? arguments[2] : "tip_best";
         Loader loader("controller_interface", "controller_interface::ChainableControllerInterface");
         chained_references_give_the_commands_of_the_loop(loader, recording);
+        what_was_requested_before_is_not_executed_when_it_is_activated(loader, recording);
+        a_position_that_is_not_known_any_more_is_an_error(loader, recording);
         references_of_a_topic_stop_with_their_device(loader, recording);
         a_robot_has_its_degrees_of_freedom_and_finds_their_slack(loader, tip);
         wrong_parameters_are_refused(loader, recording, tip);

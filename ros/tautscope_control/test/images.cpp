@@ -49,7 +49,6 @@ struct Recorded {
 int in_turn(const Recorded &recorded) {
     ControlLoop control(recorded.toml);
     tautscope::Detector detector(recorded.toml);
-    control.set_measured(recorded.ticks.at(0).reference);
     control.post(Request::enable);
     std::size_t wrong = 0, image = 0;
     unsigned long allocated = 0;
@@ -60,6 +59,7 @@ int in_turn(const Recorded &recorded) {
     };
     for (std::size_t tick = 0; tick < recorded.ticks.size(); ++tick) {
         const ::Tick &now = recorded.ticks[tick];
+        control.set_measured(recorded.ticks[0].reference, now.time);
         control.set_reference(now.reference, now.made_at);
         const Values command = control.step(now.time).command;
         const double values[] = {command[0], command[1], command[2]};
@@ -97,7 +97,6 @@ int in_two_threads(const Recorded &recorded) {
                 found += report.status == TAUTSCOPE_STATUS_OK;
             },
             [](const std::string &error) { std::printf("%s\n", error.c_str()); });
-        control.set_measured(recorded.ticks.at(0).reference);
         control.post(Request::enable);
         auto next = std::chrono::steady_clock::now();
         std::size_t image = 0;
@@ -108,6 +107,7 @@ int in_two_threads(const Recorded &recorded) {
                 offered += 2;
             }
             const auto start = std::chrono::steady_clock::now();
+            control.set_measured(recorded.ticks[0].reference, now.time);
             control.set_reference(now.reference, now.made_at);
             control.step(now.time);
             control.exchange();
@@ -144,11 +144,37 @@ int in_two_threads(const Recorded &recorded) {
     return !is_complete || counts.used != reports || found == 0;
 }
 
+/// What was detected for an image from before the loop was disabled is not used when it is enabled again.
+int disabled_meanwhile(const Recorded &recorded) {
+    ControlLoop control(recorded.toml);
+    tautscope::Detector detector(recorded.toml);
+    DetectionExchange &exchange = control.detection();
+    const auto tick = [&](double time) {
+        control.set_measured(recorded.ticks.at(0).reference, time);
+        control.step(time);
+        control.exchange();
+    };
+    control.post(Request::enable);
+    tick(0.0);
+    exchange.request(0.0);
+    tick(0.005);
+    const TautscopeDetection detection = detector.detect(recorded.image(0).view, *exchange.prediction());
+    exchange.submit(&detection);
+    control.post(Request::disable);
+    tick(0.01);
+    const bool is_dropped = exchange.is_free() && exchange.take_report() == nullptr;
+    exchange.request(0.01);
+    tick(0.015);
+    const bool is_waiting = exchange.prediction() == nullptr && exchange.withdraw();
+    std::printf("disabled: dropped %d, not predicted %d\n", is_dropped, is_waiting);
+    return !is_dropped || !is_waiting;
+}
+
 } // namespace
 
 int main(int count, char **arguments) try {
     const Recorded recorded(count == 2 ? arguments[1] : "frames");
-    return in_turn(recorded) | in_two_threads(recorded);
+    return in_turn(recorded) | in_two_threads(recorded) | disabled_meanwhile(recorded);
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

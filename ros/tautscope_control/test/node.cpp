@@ -10,6 +10,7 @@
 #undef main
 #pragma GCC diagnostic pop
 
+#include <cmath>
 #include <cstdio>
 
 #include "expect.hpp"
@@ -65,17 +66,54 @@ struct Laboratory {
 
 void what_was_requested_before_is_not_executed_when_it_is_activated(const std::string &config) {
     Laboratory laboratory(config);
-    laboratory.publish("actuators/measured_js", laboratory.positions(3));
     laboratory.request("enable");
     laboratory.node.activate();
+    laboratory.publish("actuators/measured_js", laboratory.positions(3));
     for (int tick = 0; tick < 20; ++tick) {
         laboratory.publish("servo_jp", laboratory.positions(3));
     }
     EXPECT(laboratory.sent == 0 && laboratory.state == "DISABLED");
+    laboratory.publish("actuators/measured_js", laboratory.positions(3));
     laboratory.request("enable");
     laboratory.publish("servo_jp", laboratory.positions(3));
     laboratory.publish("servo_jp", laboratory.positions(3));
     EXPECT(laboratory.sent > 0);
+}
+
+void silent_drives_stop_the_node(const std::string &config) {
+    Laboratory laboratory(config);
+    laboratory.node.activate();
+    laboratory.publish("actuators/measured_js", laboratory.positions(3));
+    laboratory.request("enable");
+    for (int tick = 0; tick < 10; ++tick) {
+        laboratory.publish("servo_jp", laboratory.positions(3));
+    }
+    EXPECT(laboratory.state == "ENABLED");
+    for (int tick = 0; tick < 20; ++tick) {
+        laboratory.publish("servo_jp", laboratory.positions(3));
+    }
+    EXPECT(laboratory.state == "FAULT");
+}
+
+void what_cannot_be_used_is_named(const std::string &config) {
+    Laboratory laboratory(config);
+    laboratory.node.activate();
+    JointState message = laboratory.positions(2);
+    const auto log_of = [&](const std::string &topic) {
+        rclcpp::last_log.clear();
+        laboratory.publish(topic, message);
+        return rclcpp::last_log;
+    };
+    EXPECT(log_of("/encoders").empty() && log_of("actuators/measured_js").empty());
+    message.position = {std::nan(""), std::nan("")}; // not measured
+    EXPECT(log_of("/encoders").empty());
+    message.position = {INFINITY, 0.0};
+    message.name = {"bend", "slide"};
+    EXPECT(log_of("/encoders") == "/encoders: got 2 positions of [bend, slide], expected finite ones of [bend, slide]");
+    message.position = {0.0, 0.0};
+    message.name = {"left", "right"};
+    EXPECT(log_of("/encoders") == "/encoders: got 2 positions of [left, right], expected finite ones of [bend, slide]");
+    EXPECT(log_of("actuators/measured_js") == "actuators/measured_js: joints are missing");
 }
 
 void a_stamp_before_1970_ends_nothing(const std::string &config, std::size_t count) {
@@ -104,6 +142,8 @@ void a_stamp_before_1970_ends_nothing(const std::string &config, std::size_t cou
 int main(int count, char **arguments) try {
     const std::string best = count == 3 ? arguments[1] : "best.toml", tip = count == 3 ? arguments[2] : "tip_best.toml";
     what_was_requested_before_is_not_executed_when_it_is_activated(best);
+    silent_drives_stop_the_node(best);
+    what_cannot_be_used_is_named(tip);
     a_stamp_before_1970_ends_nothing(best, 3);
     a_stamp_before_1970_ends_nothing(tip, 2);
     std::printf("%d failures\n", failures);

@@ -44,7 +44,7 @@ int main(int count, char **arguments) try {
     ControlLoop control(tautscope::read_file(recording + ".toml"));
     const auto ticks = read_rows<::Tick>(recording + ".ticks");
     const auto images = read_rows<ImageUpdate>(recording + ".images");
-    control.set_measured(ticks.at(0).reference);
+    Values drives(ticks.at(0).reference);
     control.post(Request::enable);
 
     const unsigned long allocated = allocations::count;
@@ -53,8 +53,9 @@ int main(int count, char **arguments) try {
         const ::Tick &now = ticks[tick];
         apply(control, static_cast<int>(now.event));
         control.set_reference(now.reference, now.made_at);
+        control.set_measured(drives, now.time);
         const tautscope_control::Tick result = control.step(now.time);
-        control.set_measured(result.command);
+        drives = result.command;
         const double values[] = {result.command[0], result.command[1], result.command[2]};
         wrong += !is_same(values, now.command);
         held += result.state == OperatingState::paused;

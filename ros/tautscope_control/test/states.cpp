@@ -21,14 +21,18 @@ bool operator==(const Values &a, const Values &b) { return std::equal(a.begin(),
 
 /// A loop with its clock, and an operator who moves the insertion at 10 mm/s.
 struct Rig {
-    explicit Rig(const std::string &toml) : control(toml) { control.set_measured(start); }
+    explicit Rig(const std::string &toml) : control(toml) {}
 
     /// Ticks without a word from the operator.
     Tick wait(double duration) {
         Tick result{};
         for (const double end = time + duration; time < end; time += control.period()) {
+            if (!are_silent) {
+                control.set_measured(drives, time);
+            }
             result = control.step(time);
             control.exchange();
+            drives = result.is_sent ? result.command : drives;
             const double step = std::abs(result.command[0] - last);
             largest_step = std::isfinite(step) ? std::max(largest_step, step) : largest_step;
             last_motion = step > 0 ? time : last_motion;
@@ -50,6 +54,9 @@ struct Rig {
 
     ControlLoop control;
     tautscope::Vector reference = start;
+    /// Where the drives are, and whether they do not tell it.
+    Values drives{start};
+    bool are_silent = false;
     double time = 100.0, last = nan, last_motion = nan, largest_step = 0.0;
 };
 
@@ -138,18 +145,66 @@ void a_drive_fault_stops_the_drives(const std::string &toml) {
     rig.control.post(Request::resume);
     tick = rig.wait(0.01);
     EXPECT(tick.state == OperatingState::fault);
-    rig.control.set_measured(tick.command);
     rig.largest_step = 0.0;
     rig.control.post(Request::enable);
     tick = rig.move(0.5);
     EXPECT(tick.is_sent && tick.state == OperatingState::enabled && rig.largest_step < 1e-3);
+
+    // Drives repeat a fault; the operator enables too early, and again when it is cleared.
+    const auto repeat = [&](double duration) {
+        for (const double end = rig.time + duration; rig.time < end;) {
+            rig.control.post(Request::drive_fault);
+            tick = rig.wait(0.1);
+        }
+    };
+    repeat(10.0);
+    EXPECT(rig.control.status().reaction == TAUTSCOPE_REACTION_QUICK_STOP);
+    rig.control.post(Request::enable);
+    repeat(1.0);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::fault);
+    rig.control.post(Request::enable);
+    tick = rig.move(0.5);
+    EXPECT(tick.is_sent && tick.state == OperatingState::enabled);
+}
+
+void silent_drives_are_a_drive_fault(const std::string &toml) {
+    for (const Request request : {Request::enable, Request::pause}) {
+        Rig rig(toml);
+        rig.control.post(Request::enable);
+        rig.move(0.5);
+        rig.control.post(request);
+        rig.move(0.5);
+        rig.are_silent = true;
+        const double silent_since = rig.time - rig.control.period();
+        EXPECT(rig.move(0.09).is_sent);
+        const Tick tick = rig.move(rig.control.period() + silent_since + 0.1 - rig.time);
+        EXPECT(!tick.is_sent && tick.state == OperatingState::fault);
+        EXPECT(rig.control.status().flags & (1U << TAUTSCOPE_FLAG_DRIVE_FAULT));
+        // However long it lasts: enabled when they are back, not before.
+        rig.move(10.0);
+        rig.control.post(Request::enable);
+        EXPECT(rig.move(0.1).state == OperatingState::disabled && rig.control.status().is_unmeasured);
+        rig.are_silent = false;
+        rig.control.post(Request::enable);
+        EXPECT(rig.move(0.1).state == OperatingState::enabled);
+    }
+}
+
+void a_position_of_long_ago_is_none(const std::string &toml) {
+    for (const double age : {0.11, 3600.0, -3600.0}) {
+        ControlLoop control(toml);
+        control.set_measured(start, 100.0);
+        control.step(100.0);
+        control.post(Request::enable);
+        EXPECT(!control.step(100.0 + age).is_sent && control.status().is_unmeasured);
+    }
 }
 
 void motion_begins_where_the_drives_are(const std::string &toml) {
     Rig rig(toml);
     const Values measured(Numbers{35e-3, 0.1, 0.8});
-    rig.control.set_measured({nan, nan, nan});
-    rig.control.set_measured(measured);
+    EXPECT(!rig.control.set_measured({nan, nan, nan}, rig.time) && !rig.control.set_measured({0.0, 0.9}, rig.time));
+    rig.drives = measured;
     rig.control.post(Request::enable);
     Tick tick = rig.wait(0.1);
     EXPECT(tick.is_sent && tick.command == measured);
@@ -160,12 +215,11 @@ void motion_begins_where_the_drives_are(const std::string &toml) {
     // Enabled again where the command was, and refused elsewhere.
     rig.control.post(Request::disable);
     rig.wait(1.0);
-    rig.control.set_measured(tick.command);
     rig.control.post(Request::enable);
     EXPECT(rig.wait(0.01).state == OperatingState::enabled);
     rig.control.post(Request::disable);
     rig.wait(0.1);
-    rig.control.set_measured({tick.command[0] + 2e-3, tick.command[1], tick.command[2]});
+    rig.drives = Values(Numbers{tick.command[0] + 2e-3, tick.command[1], tick.command[2]});
     rig.control.post(Request::enable);
     tick = rig.move(0.1);
     EXPECT(!tick.is_sent && tick.state == OperatingState::fault && rig.control.status().is_misplaced);
@@ -178,6 +232,7 @@ void the_first_reference_is_where_the_operator_is(const std::string &toml) {
             rig.control.post(Request::enable);
             if (is_resumed) {
                 rig.control.post(Request::pause);
+                rig.control.set_measured(start, rig.time - 1.0);
                 rig.control.step(rig.time - 1.0);
                 rig.control.post(Request::resume);
             }
@@ -196,11 +251,11 @@ void the_first_reference_is_where_the_operator_is(const std::string &toml) {
 
 void enable_is_refused_while_it_is_not_known_where_the_drives_are(const std::string &toml) {
     ControlLoop control(toml);
-    control.set_measured({nan, 0.0, 0.9});
+    control.set_measured({nan, 0.0, 0.9}, 0.0);
     control.post(Request::enable);
     control.set_reference(start, 0.0);
     EXPECT(!control.step(0.0).is_sent && control.status().state == OperatingState::disabled && control.status().is_unmeasured);
-    control.set_measured(start);
+    control.set_measured(start, 0.0);
     control.post(Request::enable);
     EXPECT(control.step(0.005).is_sent && !control.status().is_unmeasured);
 }
@@ -248,6 +303,8 @@ int main(int count, char **arguments) try {
     a_jump_stops_the_motion(toml);
     a_pause_holds_until_resumed(toml);
     a_drive_fault_stops_the_drives(toml);
+    silent_drives_are_a_drive_fault(toml);
+    a_position_of_long_ago_is_none(toml);
     motion_begins_where_the_drives_are(toml);
     the_first_reference_is_where_the_operator_is(toml);
     enable_is_refused_while_it_is_not_known_where_the_drives_are(toml);

@@ -55,7 +55,6 @@ void commands_and_estimates_are_those_of_python(const std::string &recording) {
     EXPECT(!control.has_bands() && control.dofs() == (std::vector<std::string>{"bend", "slide"}));
     const auto ticks = read_rows<TipTick>(recording + ".ticks");
     const auto updates = read_rows<TipUpdate>(recording + ".images");
-    control.set_measured(ticks.at(0).reference);
     control.post(Request::enable);
     std::size_t wrong = 0, update = 0;
     const unsigned long allocated = allocations::count;
@@ -64,7 +63,7 @@ void commands_and_estimates_are_those_of_python(const std::string &recording) {
         if (now.event != 0.0) {
             control.set_compensation(now.event == 4.0 ? 0.5 : 1.0);
         }
-        wrong += !control.set_reference(now.reference, now.made_at);
+        wrong += !control.set_measured(ticks[0].reference, now.time) || !control.set_reference(now.reference, now.made_at);
         wrong += !has_bits(control.step(now.time).command.data(), now.command);
         if (update < updates.size() && static_cast<std::size_t>(updates[update].tick) == tick) {
             const TipUpdate &expected = updates[update++];
@@ -108,9 +107,9 @@ void measurements_come_from_another_thread(const std::string &recording) {
         const std::size_t next = seen;
         return next < updates.size() && updates[next].tick + 100.0 < static_cast<double>(tick);
     };
-    control.set_measured(ticks.at(0).reference);
     control.post(Request::enable);
     for (const TipTick &now : ticks) {
+        control.set_measured(ticks[0].reference, now.time);
         control.set_reference(now.reference, now.made_at);
         control.step(now.time);
         control.exchange();
@@ -134,27 +133,27 @@ void wrong_measurements_change_nothing(const std::string &recording) {
     EXPECT(control.detection().measurements.push(good));
     control.exchange();
     // Nothing controls.
-    EXPECT(!has_report(control));
-    control.set_measured(good.values);
+    EXPECT(!has_report(control) && control.detection().refused == 1);
+    control.set_measured(good.values, 0.0);
     control.post(Request::enable);
     EXPECT(!control.set_reference(Numbers{0.1}, 0.0) && !control.set_reference(Numbers{0.1, std::nan("")}, 0.0));
     EXPECT(control.set_reference(Numbers{0.1, 1e-3}, 0.0) && control.step(0.0).is_sent);
     EXPECT(control.detection().measurements.push({Values(Numbers{0.1}), 0.0, 0}));
     EXPECT(control.detection().measurements.push({good.values, 0.0, 4}));
     control.exchange();
-    EXPECT(!has_report(control));
+    EXPECT(!has_report(control) && control.detection().refused == 3);
     EXPECT(control.detection().measurements.push(good));
     control.exchange();
     EXPECT(has_report(control) && !has_report(control));
     // One tolerance in rad, one in m.
     control.post(Request::disable);
     control.step(0.005);
-    control.set_measured(Numbers{0.14, 1e-3 + 0.9e-3});
+    control.set_measured(Numbers{0.14, 1e-3 + 0.9e-3}, 0.01);
     control.post(Request::enable);
     EXPECT(control.step(0.01).state == OperatingState::enabled);
     control.post(Request::disable);
     control.step(0.015);
-    control.set_measured(Numbers{0.1, 1e-3 + 1.1e-3});
+    control.set_measured(Numbers{0.1, 1e-3 + 1.1e-3}, 0.02);
     control.post(Request::enable);
     EXPECT(control.step(0.02).state == OperatingState::fault);
     std::size_t waiting = 0;

@@ -17,6 +17,8 @@ from tautscope.loop.safety import Supervision
 from tautscope.runs.control_loop import BackgroundUpdater
 
 Floats = NDArray[np.float64]
+DRIVER_TIMEOUT = 0.1
+"""Longest time without positions from the drives, as in tautscope.ros2.driver [s]."""
 START_TOLERANCE = {"mm": 1e-3, "rad": 0.05}
 """Largest distance of the drives from the last command when enabled again [m or rad]."""
 
@@ -61,9 +63,11 @@ class ControlLoop:
         self._start_tolerance = [START_TOLERANCE[dof.display_unit] for dof in config.dofs]
         self.reference = np.full(len(config.dofs), np.nan)
         self._states = StateMachine()
+        self._executor = executor
         self._updater = BackgroundUpdater(executor)
         self._command = self.reference.copy()
-        self._measured: Floats | None = None
+        self._measured = self.reference.copy()
+        self._measured_at = -math.inf
         self._next: tuple[Floats, float | None] | None = None
         self._made_at: float | None = None
         self.is_unmeasured = False
@@ -71,13 +75,14 @@ class ControlLoop:
         self._is_engaging = False
         self._engaged_at = -math.inf
 
-    def set_measured(self, position: Sequence[float] | Floats) -> None:
-        """Position of the drives (n,) [m or rad], without which `enable` is refused.
+    def set_measured(self, position: Sequence[float] | Floats, time: float) -> None:
+        """Position of the drives (n,) [m or rad] at a time [s].
 
+        Without one of the last `DRIVER_TIMEOUT` `enable` is refused, and later it is a drive fault.
         Values that are not finite are ignored.
         """
         if np.isfinite(position).all():
-            self._measured = np.array(position, np.float64)
+            self._measured, self._measured_at = np.array(position, np.float64), time
 
     def set_reference(
         self, position: Sequence[float] | Floats, made_at: float | None = None
@@ -94,6 +99,8 @@ class ControlLoop:
         if new is not None and new[1] is not None and new[1] < self._engaged_at:
             # An old reference must not begin a motion, nor stop one that has not begun.
             new = None
+        if not self._is_measured(time):
+            self.raise_drive_fault()
         if self.state is OperatingState.DISABLED:
             return Tick(self._command, False, self.state)
         if new is not None:
@@ -126,30 +133,35 @@ class ControlLoop:
             measurements: What other sensors measured.
         """
         if self.state is OperatingState.DISABLED:
+            # An image whose detection still runs is not used when it is enabled again.
+            self._updater = BackgroundUpdater(self._executor)
             return []
         reports: list[tuple[Frame | Measurement, Report]] = []
         reports += self._updater.update(self.loop, frame)
         reports += [(each, self.loop.on_sample(each)) for each in measurements]
         return reports
 
-    def request(self, command: str) -> bool:
-        """Execute a `state_command`; whether there is one of this name."""
+    def request(self, command: str, time: float) -> bool:
+        """Execute a `state_command` at a time [s]; whether there is one of this name."""
         if command == "acknowledge":
             self.loop.acknowledge()
         elif command in STATE_COMMANDS:
             is_accepted = self._states.accept(command, self.supervision.reaction)
             self.is_unmeasured &= not is_accepted
             if is_accepted and command == "enable":
-                self._enable()
+                self._enable(time)
             elif is_accepted and command == "resume":
                 self._engage()
         else:
             return False
         return True
 
-    def _enable(self) -> None:
+    def _is_measured(self, time: float) -> bool:
+        return abs(time - self._measured_at) <= DRIVER_TIMEOUT
+
+    def _enable(self, time: float) -> None:
         """Begin where the drives are; nothing moves before the next reference."""
-        if self._measured is None:
+        if not self._is_measured(time):
             self._states.goal, self.is_unmeasured = OperatingState.DISABLED, True
             return
         if not np.isfinite(self._command).all():
@@ -162,7 +174,10 @@ class ControlLoop:
 
     def raise_drive_fault(self) -> None:
         """Stop: a drive reports a fault."""
-        if self.state is not OperatingState.DISABLED:
+        # Drives repeat it; a flag that is raised again after `safety.hold_time` could not be
+        # cleared any more.
+        is_raised = "drive_fault" in self.supervision.flags
+        if self.state is not OperatingState.DISABLED and not is_raised:
             self.loop.raise_flag("drive_fault")
 
     @property

@@ -116,7 +116,11 @@ class InstrumentNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start the ticks; the state command `enable` starts the motion."""
         assert self._control is not None
-        self._control.request("disable")  # what was requested before is not executed now
+        # What was requested or measured before is not used now.
+        self._control.request("disable", self._now())
+        self._control.exchange(None)
+        self._newest = None
+        self._measurements.clear()
         self._last_state = OperatingState.DISABLED
         self._achieved = Achieved(self._config)
         self._session_timers = [
@@ -151,7 +155,7 @@ class InstrumentNode(LifecycleNode):
         self._session_timers = []
         if self._control is not None and self._last_state is not OperatingState.DISABLED:
             self._stop_drives()
-            self._control.request("disable")
+            self._control.request("disable", self._now())
             self._last_state = OperatingState.DISABLED
             self._status_publisher.publish_state(self._control)
             if results := self._achieved.results():
@@ -223,7 +227,7 @@ class InstrumentNode(LifecycleNode):
         self._control.set_reference(reference, 1e-9 * (made_at - self._origin))
 
     def _on_state_command(self, message: StringStamped) -> None:
-        if self._control is not None and not self._control.request(message.string):
+        if self._control is not None and not self._control.request(message.string, self._now()):
             self.get_logger().warning(
                 f"state_command {message.string}: expected {', '.join(STATE_COMMANDS)} or "
                 "acknowledge"
@@ -231,9 +235,14 @@ class InstrumentNode(LifecycleNode):
 
     def _on_measured(self, message: JointState) -> None:
         measured = positions(message, self._joints)
-        # CRTK: a stamp of 0 marks what is not valid.
-        if self._control is not None and measured is not None and nanoseconds(message.header.stamp):
-            self._control.set_measured(measured)
+        # CRTK: a stamp of 0 marks what is not valid. Others count by their arrival.
+        if self._control is None or not nanoseconds(message.header.stamp):
+            return
+        if measured is None:
+            topic = "actuators/measured_js"
+            self.get_logger().warning(f"{topic}: joints are missing", throttle_duration_sec=1.0)
+            return
+        self._control.set_measured(measured, self._now())
 
     def _on_actuators(self, message: OperatingStateMessage) -> None:
         if self._control is not None and message.state == OperatingState.FAULT:

@@ -70,9 +70,9 @@ public:
     /// The control period [s].
     double period() const noexcept { return period_; }
 
-    /// Position of the drives (n,) [m or rad], where the command begins; without one `enable` is refused. Ignored unless n numbers
-    /// are finite.
-    void set_measured(Numbers position) noexcept;
+    /// Position of the drives (n,) [m or rad] at `time` [s], where the command begins; without one of the last 0.1 s `enable` is
+    /// refused, and later their silence is a drive fault. Ignored unless n numbers are finite, and then false.
+    bool set_measured(Numbers position, double time) noexcept;
 
     /// The newest reference (n,) [m or rad], made at `made_at` [s], NaN if that is not known; ignored likewise, and then false.
     bool set_reference(Numbers position, double made_at) noexcept;
@@ -102,7 +102,9 @@ public:
 
 private:
     void apply_requests(double time) noexcept;
-    void enable() noexcept;
+    void enable(double time) noexcept;
+    void raise_drive_fault() noexcept;
+    bool is_measured(double time) const noexcept;
     void engage() noexcept;
     void update_state() noexcept;
     bool is_finite(Numbers values) const noexcept;
@@ -115,7 +117,7 @@ private:
     DetectionExchange exchange_;
     double period_;
     Values measured_, reference_, used_, command_;
-    double made_at_;
+    double measured_at_, made_at_;
     /// When motion was last enabled or resumed [s].
     double engaged_at_;
     bool has_new_reference_ = false;

@@ -79,9 +79,11 @@ public:
     /// Measurements from one thread, and the reports on them back to it.
     Queue<Measurement, 64> measurements;
     Queue<TautscopeTipReport, 64> reports;
+    /// Measurements that the loop did not use.
+    std::atomic<std::size_t> refused{0};
 
 private:
-    bool serve_image(tautscope::Loop &loop) noexcept;
+    bool serve_image(tautscope::Loop &loop, bool is_used) noexcept;
 
     enum class Phase : std::uint8_t { free, requested, serving, predicted, detected, reported };
 

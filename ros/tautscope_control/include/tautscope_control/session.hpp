@@ -64,7 +64,7 @@ private:
 
     double seconds(std::int64_t nanoseconds) const { return 1e-9 * static_cast<double>(nanoseconds - origin_.nanoseconds()); }
     template <class Report> void on_report(const Report &report);
-    void on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor);
+    void on_measurement(const sensor_msgs::msg::JointState &message, const std::string &topic, std::uint32_t sensor);
     void publish_reports();
     void publish_state(const Status &status, const rclcpp::Time &now);
     void publish_diagnostics(const Status &status, const rclcpp::Time &now);
