@@ -132,18 +132,6 @@ fn errors_name_the_key() {
             "vision.least_inside: got NaN",
         ),
         (
-            "vision.least_inside = 0.0".into(),
-            "vision.least_inside: got 0, expected above 0, below 1",
-        ),
-        (
-            "vision.clear.least_edges = 1".into(),
-            "vision.clear.least_edges: got 1, expected above 0, below 1",
-        ),
-        (
-            "rotation.recovery = 1.0".into(),
-            "rotation.recovery: got 1, expected at least 0, below 1",
-        ),
-        (
             "control.period = 0.001".into(),
             "control.history: got 2, expected at most 1024 control periods",
         ),
@@ -230,6 +218,24 @@ fn both_bands_are_on_the_tip() {
         (
             "[instrument]\nmarker_b = 0.019".into(),
             "instrument.marker_b: got 0.019, expected a band within tip_length",
+        ),
+    ]);
+}
+
+#[test]
+fn open_ranges_are_without_their_ends() {
+    check_errors(&[
+        (
+            "vision.least_inside = 0.0".into(),
+            "vision.least_inside: got 0, expected above 0, below 1",
+        ),
+        (
+            "vision.clear.least_edges = 1".into(),
+            "vision.clear.least_edges: got 1, expected above 0, below 1",
+        ),
+        (
+            "rotation.recovery = 1.0".into(),
+            "rotation.recovery: got 1, expected at least 0, below 1",
         ),
     ]);
 }

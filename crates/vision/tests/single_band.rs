@@ -20,7 +20,7 @@ fn a_clear_band_alone_is_rejected_for_its_unknown_place() {
         .flat_map(|at| colours[usize::from(is_disc(at))])
         .collect();
     let frame = Image::new(&data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
-    let mut reasons = |predictor: &Anywhere| {
+    let reasons = |predictor: &Anywhere| {
         let mut detector = Detector::new(SETTINGS).unwrap();
         let (found, _) = detector.recognise(&frame, predictor);
         found.rejections.map(|one| one.map(|one| one.to_string()))
