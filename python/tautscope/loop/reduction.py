@@ -630,13 +630,13 @@ class HysteresisReduction:
     def _log_slow(self, reading: Reading, time: float) -> None:
         # The flags of late ticks blame other programs. These make some calls longer, not the least.
         took = len(reading.times) * min(reading.times, default=0.0)
-        period, name = self._config.control.period, reading.name
-        if took > period:
+        stall, name = self._config.safety.stall, reading.name
+        if took > stall / 2:
             what = "at %.3f s: an update takes %.2g s, with %d calls of %s, and step waits for it. "
-            what += "More than control.period = %g s makes ticks late: make %s faster, give "
-            what += "on_measurement a jacobian, or use a longer period"
+            what += "More than half of safety.stall = %g s may hold motion: make %s faster, or "
+            what += "give on_measurement a jacobian"
             calls = reading.calls * len(reading.times)
-            self._log_once(name, what, time, took, calls, name, period, name)
+            self._log_once(name, what, time, took, calls, name, stall, name)
 
     def _log_once(self, key: str, text: str, *values: object) -> None:
         if key not in self._logged:

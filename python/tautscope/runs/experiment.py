@@ -120,8 +120,8 @@ def run_experiment(
 def _check_reference(reference: Reference) -> None:
     """Check what is read when a run ends, before its motors move."""
     duration: Any = getattr(reference, "duration", None)
-    if check_time("reference.duration", duration) <= 0.0:
-        raise SignalError("reference.duration", duration, "a time above 0 s")
+    if not isinstance(duration, int | float | np.number) or not duration > 0.0:
+        raise SignalError("reference.duration", duration, "a time above 0 s, or inf")
     segments = getattr(reference, "segments", None)
     if not isinstance(segments, Sequence) or not all(isinstance(s, Segment) for s in segments):
         allowed = "a sequence of tautscope.references.Segment, which may be empty: ()"
