@@ -35,19 +35,18 @@ RIVALS: tuple[Name, ...] = ("visual servoing", "constant compensation")
 TUNING_SEEDS, TUNING_DURATION = range(1000, 1010), 60.0
 RATES: dict[float, tuple[Triple, ...]] = {
     0.02: ((3.0, 3.0, 3.0), (4.0, 4.0, 4.0), (6.0, 3.0, 4.0), (6.0, 6.0, 4.0), (8.0, 8.0, 8.0)),
-    0.08: ((2.0, 2.0, 2.0), (3.0, 3.0, 3.0), (4.0, 4.0, 4.0), (6.0, 6.0, 4.0), (6.0, 6.0, 6.0)),
-    0.25: ((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0), (4.0, 4.0, 4.0)),
+    0.08: ((3.0, 3.0, 3.0), (4.0, 3.0, 3.0), (3.0, 4.0, 3.0), (4.0, 4.0, 4.0), (6.0, 6.0, 4.0)),
+    0.25: ((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 2.0, 3.0), (3.0, 3.0, 3.0)),
 }
 """Rates of visual servoing that `--tune` compares, by latency [1/s]."""
 FREE_GAINS: tuple[Triple, ...] = tuple((gain, gain, gain) for gain in (5.0, 10.0, 20.0))
 SERVOING: dict[float, Triple] = {
     0.02: (6.0, 3.0, 4.0),
-    0.08: (4.0, 4.0, 4.0),
-    0.25: (3.0, 3.0, 3.0),
+    0.08: (4.0, 3.0, 3.0),
+    0.25: (2.0, 2.0, 2.0),
 }
 """Rates of visual servoing per latency [1/s]: the best median reductions of `--tune` among rates
-with which no instrument is worse than without compensation; not those at 0.08 and 0.25 s, see the
-page."""
+with which no instrument is worse than without compensation."""
 FREE_GAIN: Triple = (5.0, 5.0, 20.0)
 """Free gains of constant compensation: the best median reduction of `--tune`."""
 
