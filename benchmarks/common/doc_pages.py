@@ -1,8 +1,9 @@
 """Replacement of the generated sections of documentation pages."""
 
-import os
 import re
 from pathlib import Path
+
+from tautscope.runs.output_folder import replace_text
 
 
 def find(page: Path, name: str) -> re.Match[str]:
@@ -27,10 +28,4 @@ def insert(page: Path, name: str, text: str) -> None:
         OSError: It cannot be written.
     """
     old = find(page, name)
-    partial = page.with_name(f".{page.name}.{os.getpid()}.partial")
-    try:
-        new = f"{old.string[: old.start()]}\n{text}\n{old.string[old.end() :]}"
-        partial.write_text(new, encoding="utf-8")
-        partial.replace(page)
-    finally:
-        partial.unlink(missing_ok=True)
+    replace_text(page, f"{old.string[: old.start()]}\n{text}\n{old.string[old.end() :]}")

@@ -44,7 +44,7 @@ def goal_row(
 
 
 def outcome_rows(found: Mapping[Any, Any]) -> list[dict[str, Any]]:
-    """Return a row per job, for `json.dumps` with `default=asdict`."""
+    """Return a row per job, for `json.dumps`; dataclasses need its `default=asdict`."""
     return [{"job": job, "outcome": outcome} for job, outcome in found.items()]
 
 

@@ -1,7 +1,6 @@
 """A calibration of all kinds in sequence: its state, which survives an interruption, and report."""
 
 import json
-import os
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -15,6 +14,7 @@ from tautscope.config import Config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
 from tautscope.report.report import configuration, document, embedded
+from tautscope.runs.output_folder import replace_text
 
 
 class SessionState(msgspec.Struct, forbid_unknown_fields=True):
@@ -143,9 +143,4 @@ def _read(path: Path) -> SessionState | None:
 
 def _write(path: Path, document: object) -> None:
     """Replace a file in one step."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_text(json.dumps(document, indent=1), encoding="utf-8")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    replace_text(path, json.dumps(document, indent=1))

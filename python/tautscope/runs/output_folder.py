@@ -71,6 +71,16 @@ def new_file(path: str | PathLike[str]) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
+def replace_text(path: Path, text: str) -> None:
+    """Replace a file in one step: after an error, an `OSError`, it is as before."""
+    partial = _beside(path)
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
 def _beside(target: Path) -> Path:
     """A path for the time until an output is complete, of this process alone."""
     return target.with_name(f".{target.name}.{os.getpid()}.partial")
